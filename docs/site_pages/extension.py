@@ -32,8 +32,9 @@ _pictures: dict[str, list[str]] = {}  # marker in a page -> thumbnails that repl
 
 # Links that leave this folder in the repository -> the page that replaces them on the site.
 _MOVED = {
-    "../examples/emb_caliper": "_generated/third-brake.md",
-    "../examples/emb_caliper/README.md": "_generated/third-brake.md",
+    "../examples/emb_caliper": "_generated/example-emb_caliper.md",
+    "../examples/emb_caliper/README.md": "_generated/example-emb_caliper.md",
+    "../examples/truck_ebs/README.md": "_generated/example-truck_ebs.md",
     "../benches": "_generated/benches.md",
     "../src/bywire/plant": "_generated/elements/index.rst",
     "trust/": "trust.md",

@@ -38,7 +38,8 @@ def texts() -> Iterator[tuple[str, str]]:
         for module in inside.values():
             yield f"elements/{module.__name__}.rst", elements.page(module)
     yield "benches.md", repository_files.benches_page()
-    yield "third-brake.md", repository_files.third_brake_page()
+    for example, text in repository_files.example_pages().items():
+        yield f"example-{example}.md", text
     yield "changes.md", repository_files.changes_page()
     yield "live.md", live_pages.page()
 

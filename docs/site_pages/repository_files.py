@@ -27,10 +27,12 @@ def benches_page() -> str:
     return "\n".join(lines)
 
 
-def third_brake_page() -> str:
-    """Return the README of the third brake's package, without links."""
-    text = (ROOT / "examples" / "emb_caliper" / "README.md").read_text(encoding="utf-8")
-    return _LINK.sub(r"`\1`", text)
+def example_pages() -> dict[str, str]:
+    """Return the READMEs of the example packages, without links, by the name of their folder."""
+    readmes = sorted((ROOT / "examples").glob("*/README.md"))
+    return {
+        path.parent.name: _LINK.sub(r"`\1`", path.read_text(encoding="utf-8")) for path in readmes
+    }
 
 
 def changes_page() -> str:

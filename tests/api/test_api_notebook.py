@@ -87,7 +87,7 @@ def test_ends_stay_in_the_declared_range():
     for name, leaf in known.items():
         value = values[name]
         if value == 0.0 and math.inf in (-leaf.low, leaf.high):
-            with pytest.raises(ParameterError, match="change it first"):
+            with pytest.raises(ParameterError, match="Change it first"):
                 ends_of(leaf, value)
             continue
         low, high = ends_of(leaf, value)

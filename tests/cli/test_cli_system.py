@@ -145,7 +145,9 @@ def test_what_it_does_not_declare_is_said(bywire: Bywire) -> None:
 def test_an_experiment_of_any_brake_takes_the_only_parameter_set(
     bywire: Bywire, tmp_path: Path
 ) -> None:
-    refused(bywire("run", "step"), "is for any brake. Specify a parameter set", "dardanelli2010")
+    refused(
+        bywire("run", "step"), "works with any brake. Specify a parameter set", "dardanelli2010"
+    )
     plain = ("--set", "options.input=F_set", "--set", "options.output=x")
     done = bywire("run", "step", *plain, *SYSTEM, "--json")
     assert done.status == 0, done.err

@@ -76,6 +76,21 @@ MISTAKES = {
         "plant/ball_screw_gear", "(torque - par.J_mot", "(torque + par.J_mot", check_energy
     ),
     "missing half": Mistake("plant/end_stop", "0.5 * par.k_stop", "par.k_stop", check_energy),
+    "slip of one spring lost": Mistake(
+        "plant/pad_hysteresis", "W_3 * ops.fabs(slip.z_3)", "0.0 * W_3 * slip.z_3", check_energy
+    ),
+    "width without its stiffness": Mistake(
+        "plant/pad_hysteresis", "W_2 / par.k_2, W_3", "W_2 / par.k_1, W_3", check_energy
+    ),
+    "spring that does not follow": Mistake(
+        "plant/pad_hysteresis",
+        "Speeds(u.v, u.v, u.v, u.v)",
+        "Speeds(u.v, u.v, u.v, -u.v)",
+        check_energy,
+    ),
+    "no width": Mistake(
+        "plant/pad_hysteresis", "def slip_width", "def _slip_width", check_energy, "balance, mass"
+    ),
     "loss that gives": Mistake("plant/dc_motor", "return par.R_m", "return -par.R_m", check_loss),
     "claim left out": Mistake("plant/dc_motor", "copper loss, >= 0", "copper loss", check_loss),
     "stop that pulls": Mistake(

@@ -86,7 +86,7 @@ def test_refused_mappings(content, kind, text):
         (b"\xff\xfe", "is not UTF-8"),
         (b"a." * 50_000 + b"b = 1", "dotted key"),
         (b"x = " + b"[" * 5000, "nested|valid TOML"),
-        (b"#" * 1_000_001, "more than 1000 kB"),
+        (b"#" * 1_000_001, "larger than 1000 kB"),
         (b"formt = 'csv'", "map.toml: unknown key"),
     ],
 )

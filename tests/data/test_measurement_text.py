@@ -133,7 +133,7 @@ def test_a_temperature_is_no_time(tmp_path, header):
         ("t [s],x [m]\n0,1\n,2\n1,3\n", "line 3: nan s is not a time"),
         ("t [s],x [m]\n0,1\n1,fast\n", "line 3, column 'x': 'fast' is not a finite number"),
         ("t [s],x [m]\n0,1\n1,1e999\n", "line 3, column 'x': '1e999' is not a finite number"),
-        ("t [s],x [m]\n0,1\n1\n", "line 3: 1 cells, but the first row has 2"),
+        ("t [s],x [m]\n0,1\n1\n", "line 3: 1 cell, but the first row has 2"),
         ("t [s],x [m]\n0,1\n1,2,3\n", "line 3: 3 cells, but the first row has 2"),
         ('t [s],x [m]\n0,1\n1,"2\n', "line 3: .*quotation marks"),
         ("t [s];x [m]\n0;1.5\n1;2,5\n", "mixes decimal comma and decimal point"),

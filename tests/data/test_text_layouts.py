@@ -169,11 +169,11 @@ def test_the_same_measurement_in_every_layout(tmp_path, layout):
     [
         (
             "# rig\n" + HEADER + rows(),
-            "1 lines before the table, from line 1 .'# rig'",
+            "1 line before the table, from line 1 .'# rig'",
         ),
         (
             "t [s],10\n" + rows(),
-            "line 1 as titles although it contains numbers .'10'.. Set titles = false",
+            "line 1 as column titles although it contains numbers .'10'.. Set titles = false",
         ),
         (
             HEADER + rows().replace("0.200,", "# x\n0.200,"),
@@ -297,7 +297,7 @@ def test_bytes_that_are_not_text_in_any_table_are_refused(tmp_path, byte):
         ("Time,p [bar]\n12:34,1\n12:35,2\n", "'Time'. Reason: its times or dates"),
         ("t;p\ns;foo\n0;1\n1;2\n", "Its columns are s, foo"),
         ("t;p;x\ns;bar;foo\n0;1;2\n1;2;3\n", "column 'x': the unit 'foo' is not known"),
-        ("t [s] p [bar]\n0 1\n1\n", "line 3: 1 cells, .*use a mark such as nan"),
+        ("t [s] p [bar]\n0 1\n1\n", "line 3: 1 cell, .*use a mark such as nan"),
         ("Date,p [bar]\n03/04/2026,1\n03/04/2026,2\n", "'Date'. Reason: its times or dates"),
         ("time [s],p [bar]\n09:12:33.5,1\n9.7,2\n", "line 2, .*is a time stamp"),
         (

@@ -282,7 +282,7 @@ def test_what_does_not_fit_is_refused(ramp: xr.Dataset) -> None:
         replay(bench, ramp[["i", "p_mc"]], {"i_set": "p_mc"})
     gap = ramp[["i", "p_mc"]].copy(deep=True)
     gap["i"][40] = np.nan
-    with pytest.raises(ParameterError, match="i drives the model, but lacks 1 samples"):
+    with pytest.raises(ParameterError, match="i drives the model, but is missing 1 sample,"):
         replay(bench, gap, {"i_set": "i"})
 
 

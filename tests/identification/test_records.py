@@ -68,7 +68,7 @@ def test_missing_signals_samples_and_wrong_units_are_refused(tmp_path: Path) -> 
         measured([path], None, {"p": "A"})
     data["p"][7] = np.nan
     path = write_measurement(data, tmp_path / "gap.nc")
-    with pytest.raises(ParameterError, match=r"1 samples, the first at 5\.07 s"):
+    with pytest.raises(ParameterError, match=r"1 sample, the first at 5\.07 s"):
         measured([path], None, {"p": "Pa"})
     assert np.isnan(measured([path], None, {"p": "Pa"}, gaps=True).data["p"]).sum() == 1
 

@@ -59,7 +59,7 @@ def test_a_seal_that_drives_is_refused() -> None:
     method = METHODS.all()["seal-friction"]
     data = method.synthetic(None, method.defaults, 1)
     middle = method.defaults.x_low + method.defaults.x_high  # type: ignore[attr-defined]
-    with pytest.raises(ParameterError, match=r"F moves against x \(mean friction -\S+ N"):
+    with pytest.raises(ParameterError, match=r"F moves against x \(the mean friction is -\S+ N"):
         method.identify(data.assign(x=middle - data["x"]), None, method.defaults, Effort())
 
 

@@ -203,3 +203,28 @@ def test_power_is_balanced(stage):
     out = run.copper + run.shaft + run.lost + stored  # within the error of the method
     assert run.power_in == pytest.approx(out, rel=1e-6)
     assert (run.lost > 0.01) == bool(stage)
+
+
+def largest_torque(omega, i_max=240.0, V_dc=300.0):
+    """Return the largest torque and its currents within the circles of current and voltage."""
+    par, V = motor(TRACTION), inverter.largest_voltage(V_dc)
+    best = (0.0, 0.0, 0.0)
+    center, span = (-120.0, 120.0), 120.0
+    for _ in range(8):  # a grid that closes in on the best currents
+        for i_d in np.linspace(center[0] - span, center[0] + span, 41):
+            for i_q in np.linspace(center[1] - span, center[1] + span, 41):
+                x = pmsm.State(i_d, i_q)
+                v = pmsm.balance(x, pmsm.Input(0.0, 0.0, omega), par)
+                if math.hypot(v.i_d, v.i_q) <= V and math.hypot(i_d, i_q) <= i_max:
+                    best = max(best, (pmsm.airgap_torque(x, par), i_d, i_q))
+        center, span = best[1:], span / 3.0
+    return best
+
+
+@pytest.mark.parametrize(
+    ("rpm", "torque", "i_d", "i_q"), [(6000, 84.33, -228.5, 73.3), (12000, 39.43, -221.4, 35.1)]
+)
+def test_the_largest_torque_at_high_speed(rpm, torque, i_d, i_q):
+    best = largest_torque(rpm * math.pi / 30)
+    assert best[0] == pytest.approx(torque, rel=2e-3)
+    assert best[1:] == pytest.approx((i_d, i_q), abs=1.0)

@@ -71,7 +71,7 @@ def test_a_rider_who_goes_over_the_handlebar_is_told_of() -> None:
 
     assert warned(over - 1e-6) == []
     (text,) = warned(over + 0.1)
-    assert "goes over the handlebar" in text
+    assert "goes over the handlebars" in text
     assert "at t = 0.1 s (pitch up to 53.8 deg, limit 48.1 deg)" in text
 
 
@@ -92,4 +92,4 @@ def test_a_stop_names_the_rider_thrown_and_the_lift_limit_that_did_not_follow() 
     derived, thrown = result.warnings
     assert derived.startswith("ecu.front_lift.a_lim = 10.37")
     assert "now gives 9.186" in derived
-    assert "goes over the handlebar" in thrown
+    assert "goes over the handlebars" in thrown

@@ -72,3 +72,16 @@ def test_without_a_declaration_a_set_point_is_a_line_like_any_other() -> None:
 def test_energies_and_modes_alone_draw_nothing() -> None:
     with pytest.raises(ParameterError, match="no panel"):
         time_traces(OWN[["E_source", "at_stop"]])
+
+
+def test_signals_of_different_sizes_have_panels_of_their_own() -> None:
+    own = recording(
+        s=("m", "distance", 70.0 * T), u=("m", "tire deflection", 2e-3 * T), x=("m", "way", 9.0 * T)
+    )
+    drawn = [[trace.variable for trace in panel.traces] for panel in panels_by_unit(own)]
+    assert drawn == [["s", "x"], ["u"]]
+
+
+def test_a_panel_of_unlike_labels_is_named_by_its_quantity() -> None:
+    own = recording(F=("N", "braking force of the tire", T), N=("N", "load of the wheel", T))
+    assert [panel.quantity for panel in panels_by_unit(own)] == ["force"]

@@ -66,6 +66,11 @@ BANNED = (
     Banned(r"\bsays? so\b", "the report says so", "states this"),
     Banned(r"\ball of it is made\b", "all of it is made from code", "generated"),
     Banned(r"\bnot till\b", "not till the end", "not until"),
+    Banned(r"\b[Ff]alsif(?:y|ied|ies)\b", "a fault falsifies a signal", "corrupts"),
+    Banned(r"\benerg(?:y|ies) turned over\b", "1e-5 of the energy turned over", "transferred"),
+    Banned(r"\bagree[sd]? within\b", "they agree within 1 %", "agree to within"),
+    Banned(r"\bType for example\b", "Type for example --at 2", "For example, type"),
+    Banned(r"\bsooner or later\b", "one tick sooner or later", "earlier or later"),
 )
 _ANY = re.compile("|".join(f"(?:{banned.pattern})" for banned in BANNED))
 _GENERATED = {"_build", "_generated"}

@@ -1,4 +1,4 @@
-"""Signals after taps: unchanged without a fault, falsified as specified; missed ticks."""
+"""Signals after taps: unchanged without a fault, corrupted as specified; missed ticks."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ HELD = 20
     ],
     ids=["reading", "demand", "drive", "held"],
 )
-def test_a_tap_falsifies_as_it_is_told(signals, law):
+def test_a_tap_corrupts_as_it_is_told(signals, law):
     np.testing.assert_allclose(tapped(**signals)["y"], expected(law), rtol=0, atol=1e-12)
 
 

@@ -107,11 +107,11 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         (
             '[vary]\n"seal.T_pr" = { kind = "tolerance", tolerance = "100 %", '
             'together = ["motor.R_m"] }',
-            ["[vary] seal.T_pr.together motor.R_m", "end at 0", "must be > 0"],
+            ["[vary] seal.T_pr.together motor.R_m", "bound at 0", "must be > 0"],
         ),
         (
             '[vary]\n"motor.R_m" = "+-100 %"',
-            ["end at 0 ohm is not valid", "> 0 ohm", "narrower tolerance"],
+            ["bound at 0 ohm is not valid", "> 0 ohm", "narrower tolerance"],
         ),
         (
             '[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", together = ["ecu.K"] }',

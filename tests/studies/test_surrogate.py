@@ -133,6 +133,6 @@ def test_the_ends_that_cases_have_shown_are_known_however_they_are_rounded(findi
 
 def test_what_is_no_mapping_of_numbers_is_refused(findings):
     surrogate = surrogate_of(findings(lambda cases: scaled(cases)[0]), "peak_current")
-    with pytest.raises(ParameterError, match=r"\[\] must be SI numbers by the name"):
+    with pytest.raises(ParameterError, match=r"\[\] must map names of quantities to numbers"):
         surrogate([])
     assert surrogate({"motor.R_m": []}).shape == (0,)

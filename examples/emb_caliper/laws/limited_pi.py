@@ -48,7 +48,7 @@ class ForceInput(NamedTuple):
     """Force error, and the factor on the gains."""
 
     error: Annotated[float, Signal("N", "clamp force error", 1e3)]
-    factor: Annotated[float, Signal("1", "factor on the gains", 1.0)]
+    factor: Annotated[float, Signal("1", "scale factor for the gains", 1.0)]
 
 
 class SpeedInput(NamedTuple):

@@ -517,7 +517,10 @@ class DesignAnswer(Answer):
             final = self.tried.final
             missed = [text for text, slack in final.slacks.items() if slack < 0.0]
             texts = ", ".join(f"{text} ({judged_on(final, text)})" for text in missed)
-            return [f"the linear design meets all requirements, but not on the bench: {texts}"]
+            return [
+                "the gains meet all requirements in the linear model, but not on the bench: "
+                f"{texts}"
+            ]
         return []
 
     @staticmethod

@@ -176,8 +176,8 @@ def _require_columns_alone(method: Method, question: Question) -> None:
     if beyond or noisy:
         raise ParameterError(
             f"{option(beyond[0] if beyond else 'outputs')}{'' if beyond else ' with a noise'} "
-            f"applies only to methods for any bench ({', '.join(BENCH_METHODS.all())}). Remove "
-            f"{'it' if beyond else 'the noise'} for {method.name}",
+            f"applies only to methods that work with any bench ({', '.join(BENCH_METHODS.all())}). "
+            f"Remove {'it' if beyond else 'the noise'} for {method.name}",
             name=option(beyond[0] if beyond else "outputs"),
         )
     signals = {**method.signals, **method.optional}

@@ -142,8 +142,8 @@ def ends_of(leaf: Leaf, start: float) -> tuple[float, float]:
         return low, high
     else:
         raise ParameterError(
-            f"{leaf.name} is 0 and its range ({leaf.range_text}) has no ends, so it has no slider: "
-            f"change it first, as bywire.run(..., {{{leaf.name!r}: VALUE}})",
+            f"{leaf.name} is 0 and its range ({leaf.range_text}) has no limits, so it has no "
+            f"slider. Change it first, for example with bywire.run(..., {{{leaf.name!r}: VALUE}})",
             name=leaf.name,
             value="0",
         )

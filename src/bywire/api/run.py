@@ -382,8 +382,8 @@ def _remark(verdict: Verdict) -> str:
         return f"requirement undecided: {verdict.kpi} is not defined{limit} ({verdict.note})"
     if not verdict.is_decided:
         return (
-            f"requirement undecided: {verdict.kpi} is defined either for the step or for half the "
-            f"step, but not for both{limit}. Use a smaller step"
+            f"requirement undecided: {verdict.kpi} is defined for only one of the step and half "
+            f"the step{limit}. Use a smaller step"
         )
     return f"requirement not met: {verdict.kpi} is {amount(value, unit)}{limit}" + (
         f" ({verdict.note})" if verdict.note else ""

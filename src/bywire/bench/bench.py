@@ -556,7 +556,7 @@ def _traced(model: Any, par: ParameterSet) -> frozenset[str]:
     )
     groups = model.compliance(here)
     contact = numbers(range(sum(map(len, groups))))
-    reaction = numbers((*model.frictions, *model.limits))
+    reaction = numbers((*model.frictions, *model.limits, *model.stops))
     zeros = _Zeros()
     mass, balance = model.mass(xe, here), model.balance(x, xe, m, here, contact)
     results: tuple[Any, ...] = (
@@ -568,6 +568,7 @@ def _traced(model: Any, par: ParameterSet) -> frozenset[str]:
         ),
         balance,
         model.bounds(x, xe, m, here, contact),
+        model.widths(x, xe, m, here, contact),
         groups,
         model.gap(x, xe, here),
         model.powers(x, xe, rate, m, here, contact, reaction),

@@ -248,12 +248,12 @@ class FaultyCase(Case):
     ----------
     changes
         Times [s] on the recording's axis, in order, each with the parameters from then on.
-    falsified
-        ``falsified(t) -> dict``: signals of the model's taps, which are part of its Stimulus.
+    corrupted
+        ``corrupted(t) -> dict``: signals of the model's taps, which are part of its Stimulus.
     """
 
     changes: tuple[tuple[float, ParameterSet], ...] = ()
-    falsified: Callable[[NDArray[np.float64]], Mapping[str, NDArray[np.float64]]] = lambda _: {}
+    corrupted: Callable[[NDArray[np.float64]], Mapping[str, NDArray[np.float64]]] = lambda _: {}
 
 
 Cases = Callable[[Any, Any, Any], tuple[Case, ...]]
@@ -423,7 +423,7 @@ def as_run(
 def driven_at(case: Case, t: NDArray[np.float64]) -> Mapping[str, NDArray[np.float64]]:
     """Return the signals that a case drives at times of its recording [s], with faults."""
     given = case.stimulus(t)
-    return {**given, **case.falsified(t)} if isinstance(case, FaultyCase) else given
+    return {**given, **case.corrupted(t)} if isinstance(case, FaultyCase) else given
 
 
 def changes_of(case: Case, zero: float) -> tuple[Change, ...]:

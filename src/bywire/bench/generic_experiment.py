@@ -308,7 +308,7 @@ def _signal(
         typed = option("overrides", {f"options.{key}": next(iter(known))})
         raise ParameterError(
             f"options.{key} is missing: the {place} of {model.name} that experiment "
-            f"{experiment!r} drives. Type for example {typed}. Valid names are {valid}",
+            f"{experiment!r} drives. For example, type {typed}. Valid names are {valid}",
             name=f"options.{key}",
             valid=valid,
         )
@@ -428,8 +428,8 @@ def _former(
         return former
     example = next(iter(generic.signals))
     raise ParameterError(
-        f"experiment {name!r} is for any brake, and the experiment of the {system} is now called "
-        f"{former.name!r}. Use {former.name}, or specify the signal for {name}, for example "
+        f"experiment {name!r} works with any brake, and the experiment of the {system} is now "
+        f"called {former.name!r}. Use {former.name}, or specify the signal for {name}, for example "
         f"{option('overrides', {f'options.{example}': 'NAME'})}",
         name="experiment",
         value=name,
@@ -463,7 +463,7 @@ def usual_set(name: str) -> str:
         for now, assembly in former_names(name).items()
     )
     raise ParameterError(
-        f"experiment {name!r} is for any brake. Specify a parameter set with "
+        f"experiment {name!r} works with any brake. Specify a parameter set with "
         f"{option('overrides', {'parameters': 'NAME'})} ({known}){former}",
         name="parameters",
         valid=known,

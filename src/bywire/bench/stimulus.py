@@ -290,7 +290,8 @@ def _require_values(title: str, kind: str, values: Mapping[str, Any], level: str
             typed[f"{title}.{name}"] = "VALUE" if unit == "1" else f"VALUE {unit}"
         verb = "is" if len(lacking) == 1 else "are"
         raise ParameterError(
-            f"stimulus {kind!r}: {', '.join(lacking)} {verb} missing. Add to [{title}], or type "
+            f"stimulus {kind!r}: {', '.join(lacking)} {verb} missing. Add "
+            f"{'it' if len(lacking) == 1 else 'them'} to [{title}], or type "
             f"{option('overrides', typed)}",
             name=", ".join(typed),
         )

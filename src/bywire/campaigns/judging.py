@@ -143,7 +143,7 @@ def _computed(runs: Sequence[Run], signals: Sequence[str], engine: str) -> Seque
 
 def _missed(case: Case, task: str, time: Array) -> Array:
     """Return the rows in which a task misses its ticks, which a watchdog detects."""
-    given = case.falsified(time) if isinstance(case, FaultyCase) else {}
+    given = case.corrupted(time) if isinstance(case, FaultyCase) else {}
     return np.minimum(given.get(rests(task), np.zeros(time.size)), 1.0)
 
 

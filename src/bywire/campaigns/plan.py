@@ -171,7 +171,7 @@ class Failing:
 
     def at(self, onset: float, seed: int) -> list[Injection]:
         """Return the fault from an onset [s] on, or from the start, with the latent one."""
-        start = 0.0 if self.mode.falsified == "drift" else _LONG_AGO  # a drift grows from its start
+        start = 0.0 if self.mode.corrupted == "drift" else _LONG_AGO  # a drift grows from its start
         begin = start if self.is_present else onset
         fault = Injection(self.mode, self.value, AT_ZERO.replace({"onset": begin}), seed)
         return [fault, *([] if self.latent is None else self.latent.at(onset, seed))]
@@ -294,7 +294,7 @@ class CampaignPlan:
             return True
         mode = failing.mode
         if mode.changes is None:
-            return mode.falsified == "late"
+            return mode.corrupted == "late"
         par = self.case(0).par
         changed = mode.changes(par, failing.value)
         lengths = [name for name, value in changed.items() if isinstance(value, tuple)]

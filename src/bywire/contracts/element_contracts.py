@@ -500,14 +500,17 @@ def _relative(off: Array, scale: Array) -> float:
 
 # --- Energy: the rate of the stored energy equals the input power minus the losses
 # An element with ``energy`` also has ``power_in``. If the energy depends on a ``State``, the
-# element has ``mass`` and ``balance``. If the energy depends on inputs, it has ``input_rate``, a
-# tuple with the derivatives of these inputs under the same names. Without ``power_loss``, the
-# element is lossless. If another function of the element returns the type of an argument (such as
-# the contact forces), that function computes the argument.
+# element has ``mass`` and ``balance``, or ``rate`` and ``slip_width`` if its states are stop
+# operators. If the energy depends on inputs, it has ``input_rate``, a tuple with the derivatives of
+# these inputs under the same names. Without ``power_loss``, the element is lossless. If another
+# function of the element returns the type of an argument (such as the contact forces), that
+# function computes the argument.
 
 BALANCE = 1e-9
 """maximum error relative to the powers; the series for the fluid's flow energy has about 1e-10"""
 ENERGETIC = ("energy", "power_in", "power_loss", "mass", "balance", "input_rate")
+STOPPED = ("rate", "slip_width")
+"""functions of an element whose states are stop operators"""
 
 
 def has_rates_of_its_states(module: ModuleType) -> Iterator[Evidence]:
@@ -529,10 +532,11 @@ def has_rates_of_its_states(module: ModuleType) -> Iterator[Evidence]:
 
 def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
     """Check that an element neither creates nor hides energy."""
-    laws = {k: f for k, f in functions(module).items() if k in ENERGETIC}
+    stops = STOPPED if "slip_width" in functions(module) else ()
+    laws = {k: f for k, f in functions(module).items() if k in (*ENERGETIC, *stops)}
     powers = [law for name, law in laws.items() if name in ("energy", "power_in", "power_loss")]
     moving = getattr(module, "State", None) in merged(powers).values()
-    needed = {"power_in", *(("mass", "balance") if moving else ())}
+    needed = {"power_in", *((stops or ("mass", "balance")) if moving else ())}
     place = place_of(laws["energy"])
     if needed - laws.keys():
         missing = ", ".join(sorted(needed - laws.keys()))
@@ -555,7 +559,10 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
         terms.append(call(laws["power_loss"], sample) if "power_loss" in laws else 0.0)
         signals = [k for k in slopes if not is_parameters(arguments[k.split(".")[0]])]
         unmoved = [slopes[k] for k in signals if k not in rates]
-        compiled = ca.Function("E", [column], [ca.vertcat(*terms), ca.vertcat(0.0, *unmoved)])
+        results = [ca.vertcat(*terms), ca.vertcat(0.0, *unmoved)]
+        if stops:
+            results = _held_or_slipping(module, laws, arguments, sample, results)
+        compiled = ca.Function("E", [column], results)
         powers, hidden = (out.full() for out in compiled(samples))
         if hidden.any():
             text = (
@@ -605,7 +612,7 @@ def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
 def _consistent(module: ModuleType, known: dict[str, Any], sample: Arguments) -> Arguments:
     """Return the arguments, with those that the element's own laws determine replaced."""
     computed: Arguments = {}
-    for law in (f for k, f in functions(module).items() if k not in ENERGETIC):
+    for law in (f for k, f in functions(module).items() if k not in (*ENERGETIC, *STOPPED)):
         takes, gives = signature_of(law)
         free = is_signals(gives) and gives is not getattr(module, "State", None)
         for name in (k for k, note in known.items() if note is gives and free):
@@ -626,10 +633,35 @@ def _rates(
         )
         for field, (top, bottom) in zip(module.State._fields, pairs, strict=True):
             rates[f"{place[module.State]}.{field}"] = top / bottom
+    if "slip_width" in laws:
+        slip = sample.get("slip")
+        for k, (field, speed) in enumerate(
+            zip(module.State._fields, flat(call(laws["rate"], sample)), strict=True)
+        ):
+            rates[f"{place[module.State]}.{field}"] = speed - (0.0 if slip is None else slip[k])
     if "input_rate" in laws:
         moving = call(laws["input_rate"], sample)
         rates |= {f"{place[module.Input]}.{k}": v for k, v in moving._asdict().items()}
     return rates
+
+
+def _held_or_slipping(
+    module: ModuleType, laws: dict[str, Any], known: dict[str, Any], sample: Arguments, results: Any
+) -> Any:
+    """Return results in which each stop operator holds, or slips at its width with the motion."""
+    place = next(name for name, note in known.items() if note is module.State)
+    speeds, widths = (flat(call(laws[name], sample)) for name in ("rate", "slip_width"))
+    drawn, found = [], []
+    for k, (speed, width) in enumerate(zip(speeds, widths, strict=True)):
+        z = sample[place][k]
+        slips = z * speed > 0
+        held = ca.fmin(ca.fmax(z, -width), width)
+        drawn.append(z)
+        found.append(ca.if_else(slips, width * ca.sign(speed), held))
+        if "slip" in sample:
+            drawn.append(sample["slip"][k])
+            found.append(ca.if_else(slips, speed, 0))
+    return ca.substitute(results, drawn, found)
 
 
 # --- All of them

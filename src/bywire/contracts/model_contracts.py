@@ -199,8 +199,11 @@ def has_its_units(trial: Trial) -> Iterator[Evidence]:
             yield _fits(what, rate, unit, trial, "bounds", "friction")
     reaction = tuple(
         _at_least_one(getattr(mass, name)) * Dimensioned(0.1, states[name].unit) / second
-        for name in (*model.frictions, *model.limits)
+        for name in (*model.frictions, *model.limits, *model.stops)
     )
+    widths = model.widths(x, x, m, par, contact)
+    for name, value in zip(model.stops, widths, strict=True):
+        yield _fits(f"width of {name}", value, states[name].unit, trial, "widths", "wire")
     rates = type(x)(*(Dimensioned(0.1, s.unit) / second for s in states.values()))
     powers = model.powers(x, x, rates, m, par, contact, reaction)
     for name, signal in signals_of(model.Flow).items():

@@ -18,6 +18,7 @@ from bywire.analysis.linear.corners import (
     beside_point,
     kinks_at,
     magnitudes,
+    on_stops,
     taking,
 )
 from bywire.analysis.linear.linear_model import LinearModel
@@ -155,9 +156,10 @@ def is_linear_beside_its_corners(trial: Trial) -> Iterator[Evidence]:
     start = trial.start
     try:
         at = smooth_point(trial.model, start.par, (start.state, start.memory, None))
+        free = free_signals(at, trial.model.State._fields, trial.model.Memory._fields, ())
+        at, _ = on_stops(at, free)
     except InputError as error:
         raise NotCheckedError(f"at {start.known}, {error}") from error
-    free = free_signals(at, trial.model.State._fields, trial.model.Memory._fields, ())
     usual = magnitudes(at)
     kinks = kinks_at(at, free, usual, outputs=False, ticks=False)
     places = {kink.place: kink.order for kink in kinks}
@@ -181,22 +183,22 @@ def _driven(
             return None
         c = kink.slope
         if abs(kink.excess) <= 1e-3 * REACH * float(np.abs(c).sum()):
-            return _with_its_contacts(at)
+            return _with_its_contacts(at, free)
         by = np.zeros(free.size)
         by[free] = -kink.excess * c / (c @ c) * usual[free]
         at = at.moved(by)
     return None
 
 
-def _with_its_contacts(at: SmoothPoint) -> SmoothPoint | None:
-    """Return a point with its closed contacts; None if a contact just touches or is at a limit."""
+def _with_its_contacts(at: SmoothPoint, free: NDArray[np.bool_]) -> SmoothPoint | None:
+    """Return a point with its closed contacts; None if a contact, limit or stop just touches."""
     model = at.model
     state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))
     memory = cast(NamedTuple, cast(Any, model.Memory)(*at.memory.tolist()))
     if any(getattr(state, name) <= 0.0 for name in model.limits):
         return None
     try:
-        return smooth_point(model, at.par, (state, memory, None))
+        return on_stops(smooth_point(model, at.par, (state, memory, None)), free)[0]
     except InputError:
         return None
 

@@ -25,7 +25,9 @@ from bywire.core.units import shown
 
 LeastCurrent = Annotated[float, Unit("A", 10.0), Field(ge=0, allow_inf_nan=False)]
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
-Rise = Annotated[float, Signal("delta_degC", "rise above the air, estimated by the ECU", 50.0)]
+Rise = Annotated[
+    float, Signal("delta_degC", "temperature rise above air, estimated by the ECU", 50.0)
+]
 
 
 class Parameters(ParameterSet):

@@ -47,7 +47,7 @@ class Output(NamedTuple):
     """Demand, and whether it was lowered."""
 
     p: Pressure
-    lowered: Annotated[float, Signal("1", "lift control acts")]
+    lowered: Annotated[float, Signal("1", "lift control is active")]
 
 
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:

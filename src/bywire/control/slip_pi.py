@@ -70,7 +70,7 @@ class Output(NamedTuple):
     """Demand, and whether it was lowered."""
 
     p: Pressure
-    lowered: Annotated[float, Signal("1", "slip control acts")]
+    lowered: Annotated[float, Signal("1", "slip control is active")]
 
 
 def gain(

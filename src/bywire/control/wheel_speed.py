@@ -14,7 +14,7 @@ from bywire.core.quantities import Unit
 from bywire.core.signals import Signal
 
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
-Age = Annotated[float, Signal("s", "time since the last edge", 1e-3), Ge(0)]
+Age = Annotated[float, Signal("s", "time since the last encoder edge", 1e-3), Ge(0)]
 
 
 class Parameters(ParameterSet):
@@ -33,7 +33,7 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Angle of the last edge, and the speed."""
 
-    angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
+    angle: Annotated[float, Signal("rad", "angle of the last encoder edge", 100.0)]
     age: Age
     omega: Annotated[float, Signal("rad/s", "measured wheel speed", 60.0)]
 
@@ -41,7 +41,7 @@ class State(NamedTuple):
 class Input(NamedTuple):
     """Registers of the capture unit."""
 
-    angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
+    angle: Annotated[float, Signal("rad", "angle of the last encoder edge", 100.0)]
     age: Age
 
 

@@ -69,7 +69,10 @@ class Evaluated(Generic[ParT, MemoryT]):
 
     @property
     def reaction(self) -> tuple[float, ...]:
-        """Forces of the assembly's frictions, then of its limits; in ``power`` and ``record``."""
+        """Forces of the assembly's frictions, then of its limits, then minus its slip speeds.
+
+        It is available in ``power`` and ``record``.
+        """
         every = instant_of(self, "reaction").reaction
         return tuple(every[k] for k in self.reaction_places[""]) if every and self.subs else every
 
@@ -113,7 +116,7 @@ class Evaluated(Generic[ParT, MemoryT]):
         if state is not here.x:
             raise ModelError(
                 f"{type(self).__name__} is evaluated at a state that is not its holder's state. "
-                "Within an assembly, its equations are valid only at the holder's instant",
+                "Within an assembly, its equations are valid only for the holder's current state",
                 name=type(self).__name__,
             )
         here.settle()
@@ -211,6 +214,8 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     """subassemblies"""
     ports: ClassVar[tuple[Port, ...]]
     """wires that this assembly's holder sets"""
+    stops: ClassVar[tuple[str, ...]] = ()
+    """states of the parts whose elements define ``slip_width``, and those of the subassemblies"""
     reaction_places: ClassVar[dict[str, tuple[int, ...]]]
     """places of each subassembly's reactions; an empty name means the assembly's own places"""
 
@@ -275,6 +280,20 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         for _, inner, here in _held(w):
             bounds += inner.bounds(here.x, here.xe, here.memory, here.par, here.forces)
         return tuple(bounds)
+
+    def widths(
+        self, x: Any, xe: Any, memory: MemoryT, par: ParT, contact: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """Return the widths of the stop operators."""
+        if not self.stops:
+            return ()
+        w = self.at(x, memory, par, contact, xe=xe)
+        widths: list[float] = []
+        for part in _stops(type(self)):
+            widths += _row(_wired(w, part).call(part.function("slip_width")))
+        for _, inner, here in _held(w):
+            widths += inner.widths(here.x, here.xe, here.memory, here.par, here.forces)
+        return tuple(widths)
 
     def compliance(self, par: ParT) -> tuple[Matrix, ...]:
         """Return a compliance matrix per contact group; empty if a choice omits it."""
@@ -561,6 +580,13 @@ def _gather(cls: type[Any]) -> None:
                 name=part.where,
                 valid="balance",
             )
+        if part.has("slip_width") and not part.has("rate"):
+            raise ModelError(
+                f"{part.where}: {part.kind} has slip_width, but no rate. Its states are stop "
+                "operators, so define rate, which returns the speed of their motion",
+                name=part.where,
+                valid="rate",
+            )
         for name, signal in part.states().items():
             if name in states:
                 raise ModelError(
@@ -607,7 +633,7 @@ def _gather(cls: type[Any]) -> None:
 def _take_over(
     cls: type[Any], states: dict[str, Signal], flows: dict[str, Signal], shown: dict[str, Signal]
 ) -> None:
-    """Add the subassemblies' signals, frictions and limits, by their names in the holder."""
+    """Add the subassemblies' signals, frictions, limits and stops, by their names in the holder."""
     own = {kind: getattr(cls, kind, None) for kind in ("Memory", "Stimulus")}
     own = {kind: getattr(each, "own", each) for kind, each in own.items()}
     own = {kind: each if isinstance(each, type) else _Nothing for kind, each in own.items()}
@@ -643,7 +669,7 @@ def _take_over(
 
 
 _RECORDED = ("State", "Memory", "Flow", "Output")
-_REACTING = ("frictions", "limits")
+_REACTING = ("frictions", "limits", "stops")
 
 
 class _Nothing(NamedTuple):
@@ -651,25 +677,35 @@ class _Nothing(NamedTuple):
 
 
 def _number_reactions(cls: type[Any]) -> None:
-    """Append the subassemblies' frictions and limits, and store their places."""
+    """Append the subassemblies' frictions, limits and stop operators, and store their places."""
+    if "stops" in vars(cls):
+        raise ModelError(
+            f"{cls.__name__}.stops follows from the elements that define slip_width. Delete stops",
+            name=f"{cls.__name__}.stops",
+            valid="elements with the function slip_width",
+        )
     inner = {
         name: [tuple(map(sub.named, _names(type(sub.assembly), kind))) for kind in _REACTING]
         for name, sub in cls.subs.items()
     }
-    taken = {name for both in inner.values() for names in both for name in names}
+    taken = {name for kinds in inner.values() for names in kinds for name in names}
     own = [tuple(each for each in _names(cls, kind) if each not in taken) for kind in _REACTING]
-    every = [sum((both[k] for both in inner.values()), start=own[k]) for k in range(2)]
+    own[-1] = tuple(part.state_name(k) for part in _stops(cls) for k in part.element.State._fields)
+    every = [
+        sum((kinds[k] for kinds in inner.values()), start=own[k]) for k in range(len(_REACTING))
+    ]
     if cls.subs:
-        cls.frictions, cls.limits = every
-    places = {name: k for k, name in enumerate((*every[0], *every[1]))}
+        cls.frictions, cls.limits, _ = every
+    cls.stops = every[-1]
+    places = {name: k for k, name in enumerate(chain(*every))}
     cls.reaction_places = {
-        name: tuple(places[each] for each in (*frictions, *limits))
-        for name, (frictions, limits) in {"": own, **inner}.items()
+        name: tuple(places[each] for each in chain(*kinds))
+        for name, kinds in {"": own, **inner}.items()
     }
 
 
 def _names(cls: type[Any], kind: str) -> tuple[str, ...]:
-    """Return the names of the frictions or limits that a class declares. Default: none."""
+    """Return the states that a class lists as a kind, such as frictions. Default: none."""
     names = getattr(cls, kind)
     return names if isinstance(names, tuple) else ()
 
@@ -692,6 +728,11 @@ def _named_tuple(owner: type, kind: str, signals: Mapping[str, Signal]) -> Any:
 def _stores(cls: type[Any]) -> Iterator[AnyPart]:
     """Yield an assembly's parts with states."""
     yield from (part for part in cls.parts.values() if part.has("State"))
+
+
+def _stops(cls: type[Any]) -> Iterator[AnyPart]:
+    """Yield an assembly's parts whose states are stop operators."""
+    yield from (part for part in _stores(cls) if part.has("slip_width"))
 
 
 def _contacts(cls: type[Any]) -> Iterator[AnyPart]:

@@ -1,6 +1,6 @@
 """Fault modes that elements and brakes declare.
 
-The equations support three mechanisms: parameters that change at a certain time, falsified signals
+The equations support three mechanisms: parameters that change at a certain time, corrupted signals
 between plant and controllers, and controllers that miss their ticks. An element lists the
 parameters that its failure changes. A brake declares the signals, and failures with several
 changes, in a module ``faults`` of its package.
@@ -50,7 +50,7 @@ class ParameterFault:
 
 @dataclass(frozen=True)
 class Channel:
-    """Signal between plant and controllers that faults can falsify.
+    """Signal between plant and controllers that faults can corrupt.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class Channels:
     name
         Name of the assembly.
     channels
-        Signals that faults can falsify, in addition to the assembly's demands.
+        Signals that faults can corrupt, in addition to the assembly's demands.
     """
 
     name: str

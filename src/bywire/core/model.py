@@ -7,6 +7,7 @@ and needs no other code of the model. A model has:
 * dry *frictions*: velocity states whose equations contain a set-valued force between two bounds
   while the velocity is exactly zero;
 * one-sided *limits*: states that cannot fall below zero (a check valve, a stop);
+* *stop operators*: massless states that follow a motion and slip at a width (Maxwell slip);
 * *contact groups*: unilateral contacts that are coupled by their compliances;
 * *tasks*: the sampled controllers, each with its own period, which share one memory;
 * *powers*, which are integrated along with the states for the energy balance.
@@ -53,7 +54,8 @@ class Task:
 class Model(Protocol):
     """System that the engine integrates. All methods are pure and accept symbols.
 
-    A model may inherit from this class. By default, it then has no frictions, limits and contacts.
+    A model may inherit from this class. By default, it then has no frictions, limits, stop
+    operators and contacts.
     """
 
     @property
@@ -97,6 +99,14 @@ class Model(Protocol):
         return ()
 
     @property
+    def stops(self) -> tuple[str, ...]:
+        """States that are stop operators: a state follows its rate, but stays within its width.
+
+        Their rates, and the overlaps of contacts, do not depend on such states.
+        """
+        return ()
+
+    @property
     def usually_open(self) -> tuple[bool, ...]:
         """Whether each contact group rarely touches, like end stops. Default: no group.
 
@@ -123,6 +133,16 @@ class Model(Protocol):
         """Return (low, high) per friction, low <= 0 <= high, in the unit of its equation.
 
         The force is ``low`` if the velocity is positive, and ``high`` if it is negative.
+        """
+        return ()
+
+    def widths(
+        self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """Return the width of each stop operator, >= 0: its state is at most this from zero.
+
+        A width may depend on a load. The engine evaluates it at the start and at the predicted end
+        of a substep.
         """
         return ()
 
@@ -153,7 +173,9 @@ class Model(Protocol):
         """Return the rates of the Flow at the midpoint of a substep.
 
         ``xe`` is the predicted midpoint, as in ``balance``, so periodic terms are computed only
-        once. ``rate`` is dx/dt. ``reaction`` contains the friction forces, then the limit forces.
+        once. ``rate`` is dx/dt. ``reaction`` contains the friction forces, then the limit forces,
+        then minus the slip speeds of the stop operators. In ``x``, a stop operator has its mean
+        over the motion.
         """
         ...
 
@@ -224,7 +246,7 @@ class Model(Protocol):
 
 
 def require_states(model: Any) -> None:
-    """Reject a model's frictions and limits that are not among its states.
+    """Reject a model's frictions, limits and stop operators that are not among its states.
 
     Parameters
     ----------
@@ -234,10 +256,12 @@ def require_states(model: Any) -> None:
     Raises
     ------
     ModelError
-        When a friction or limit is not a state, with its declaration, name, and the nearest state.
+        When a friction, limit or stop operator is not a state, with its declaration, name, and the
+        nearest state.
     """
     fields: tuple[str, ...] = getattr(model.State, "_fields", ())
-    for kind in ("frictions", "limits") if fields else ():
+    found: dict[str, str] = {}
+    for kind in ("frictions", "limits", "stops") if fields else ():
         names = getattr(model, kind)
         if isinstance(names, property):
             continue
@@ -252,6 +276,14 @@ def require_states(model: Any) -> None:
             if name not in fields:
                 error = unknown_name("state", str(name), fields)
                 raise error.at(f"{where} lists {name!r}, which is not a field of State", ModelError)
+            if kind == "stops" and name in found:
+                raise ModelError(
+                    f"{where} lists {name!r}, which is also one of {found[name]}: a stop operator "
+                    "has no other force",
+                    name=kind,
+                    value=str(name),
+                )
+            found[name] = kind
 
 
 def _declared(module: ModuleType) -> Iterator[type[Any]]:
@@ -335,6 +367,12 @@ class Wrapping(_Protocol):
     ) -> tuple[Bounds, ...]:
         """Return the bounds of the frictions."""
         return self.inner.bounds(x, xe, self.memory_inside(memory), par, contact)
+
+    def widths(
+        self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """Return the widths of the stop operators."""
+        return self.inner.widths(x, xe, self.memory_inside(memory), par, contact)
 
     def powers(
         self,

@@ -192,7 +192,7 @@ class Part(Generic[X, U, F, P]):
             return self
         instant = instant_of(instance, self.where)
         if self.name not in instant.parts:
-            instant.parts[self.name] = Wired(self, instant)
+            instant.parts[self.name] = Wired(self, instant, type(instance))
         return instant.parts[self.name]
 
     def __set__(self, instance: Any, value: Any) -> None:
@@ -316,6 +316,27 @@ class Part(Generic[X, U, F, P]):
         state_class: type[Any] = self.element.State
         return state_class._make(
             getattr(instant.xe if fixed is None or k in fixed else instant.x, self.state_name(k))
+            for k in state_class._fields
+        )
+
+    def slip_at(self, instant: Instant, model: Any) -> Any:
+        """Return the slip speeds of its stop operators in the class of an assembly."""
+        if not self.has("slip_width"):
+            raise ModelError(
+                f"{self.where}: {self.kind} has no slip, since it does not define slip_width",
+                name=self.where,
+                valid="slip_width",
+            )
+        if not instant.reaction:
+            raise ModelError(
+                f"{self.where}: slip has no value here. Read it only in functions for losses and "
+                "recorded signals",
+                name=self.where,
+            )
+        first = len(instant.reaction) - len(model.stops)
+        state_class: type[Any] = self.element.State
+        return state_class._make(
+            -instant.reaction[first + model.stops.index(self.state_name(k))]
             for k in state_class._fields
         )
 

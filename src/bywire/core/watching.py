@@ -138,7 +138,7 @@ def _warnings_by_part(
         operands = _Operands(rows, par, is_joined)
         values = computed(tuple(tuple(each.values()) for _, each in felt), operands)
         for (part, names), each in zip(felt, values, strict=True):
-            wired: Any = Wired(part, Instant(None, None, None, par, model.shared))
+            wired: Any = Wired(part, Instant(None, None, None, par, model.shared), type(model))
             more = dict(zip(names, each, strict=True))
             yield part, wired.call(part.element.watch, t=rows["time"].values, **more)
 

@@ -27,10 +27,12 @@ class Wired(Generic[X, U, F, P]):
         The declared part.
     instant
         Instant of the evaluation.
+    model
+        Class of the assembly.
     """
 
-    def __init__(self, part: Any, instant: Instant) -> None:
-        self._part, self._instant = part, instant
+    def __init__(self, part: Any, instant: Instant, model: Any) -> None:
+        self._part, self._instant, self._model = part, instant, model
         self._input: Any = None
         self._varied: Any = None
 
@@ -74,6 +76,11 @@ class Wired(Generic[X, U, F, P]):
     def f(self) -> F:
         """Contact forces."""
         return self._part.forces_at(self._instant, self.par)  # type: ignore[no-any-return]
+
+    @property
+    def slip(self) -> X:
+        """Slip speeds of its stop operators; in ``power`` and ``record``."""
+        return self._part.slip_at(self._instant, self._model)  # type: ignore[no-any-return]
 
     @property
     def u(self) -> U:
@@ -127,11 +134,11 @@ class Wired(Generic[X, U, F, P]):
     def _argument(self, name: str, function: Callable[..., Any]) -> Any:
         if name == "x":
             return self._part.state_at(self._instant, self._part.fixed)
-        if name in ("xe", "u", "f", "par"):
+        if name in ("xe", "u", "f", "slip", "par"):
             return getattr(self, name)
         if name in self._instant.shared:
             return getattr(self._instant.par, name)
-        valid = "x, u, f, par"
+        valid = "x, u, f, slip, par"
         raise ModelError(
             f"{self._part.where}: {self._part.kind}.{function.__name__} has an argument {name!r}, "
             f"which is not available. Use {valid}, or a group that the assembly lists in shared "

@@ -34,6 +34,10 @@ def check_wiring(model: _AnyAssembly, par: ParameterSet) -> None:
     _check_held(model, par)
     _check_balance(model, at, w)
     _check_contacts(model, at)
+    widths = at.evaluated("wire", model.widths, at.state, at.state, at.memory, at.par, at.contact)
+    for name, value in zip(model.stops, widths, strict=True):
+        label = "width of a stop operator"
+        _require(model, "wire", name, value, signals_of(model.State)[name].unit, label)
     bounds = at.evaluated("friction", model.friction, w)
     for name, pair in zip(model.frictions, bounds, strict=False):
         for value in pair if isinstance(pair, tuple) and name in at.balance else ():
@@ -65,7 +69,9 @@ class _Operands:
         mass = self.evaluated("mass", model.mass, self.state, self.par)
         rates = dict(zip(model.State._fields, mass, strict=True))
         self.balance = {name: rate * getattr(self.rate, name) for name, rate in rates.items()}
-        forces = [self.balance.get(name) for name in (*model.frictions, *model.limits)]
+        forces = [
+            self.balance.get(name) for name in (*model.frictions, *model.limits, *model.stops)
+        ]
         self.reaction = tuple(forces)
 
     def tuple(self, kind: Any) -> Any:

@@ -144,7 +144,7 @@ def resample(
         Flaws during which the result is NaN: ``"gaps"``, ``"missing"`` (NaN in the file),
         ``"clipped"``. The method bridges gaps that are not excluded.
     max_gap
-        Longest pause that is not a gap, text with a unit or [s]; ten median steps by default.
+        Longest interval that is not a gap, text with a unit or [s]; ten median steps by default.
 
     Returns
     -------

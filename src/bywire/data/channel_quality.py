@@ -86,7 +86,7 @@ def quality(
     values
         Values, NaN where missing, shape ``(sample,)``.
     max_gap
-        Longest pause that is not a gap [s]; ``GAP`` median steps by default.
+        Longest interval that is not a gap [s]; ``GAP`` median steps by default.
     limits
         Range of the sensor, in the unit of the values.
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import FileError, UnitError, quoted, unknown_name
+from bywire.core.errors import FileError, UnitError, counted, quoted, unknown_name
 from bywire.core.unit_list import Scale
 from bywire.data.column_units import convert_in_place, measures, si_symbol, split_title, unit_of
 from bywire.data.file_format import Column, Source
@@ -357,7 +357,8 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
     if number:
         if number > len(order):
             raise FileError(
-                f"{file} has no column {number} ({key}). It has only {len(order)} columns",
+                f"{file} has no column {number} ({key}). It has only "
+                f"{counted(len(order), 'column')}",
                 name=key,
                 value=str(number),
                 valid=str(len(order)),

@@ -9,13 +9,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from bywire.core.errors import FileError, UnitError, quoted
+from bywire.core.errors import FileError, UnitError, counted, quoted
 from bywire.data.column_units import split_title, unit_of
 from bywire.data.file_format import ReadOptions
 from bywire.data.text_encoding import head_text
 from bywire.data.time_stamps import DIGITS, is_stamp, kind_of_stamps
 
-SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
+SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "spaces"}
 """separators of cells, in the order of the search"""
 
 HEAD = 1 << 18
@@ -234,8 +234,8 @@ def dialect_of(head: Head) -> Dialect:
     before = [k for k in range(at, begin) if not head.is_blank(k)]
     if before:
         note = (
-            f"bywire skips {len(before)} lines before the table, from line {before[0] + 1} "
-            f"({quoted(head.plain(before[0]).strip())}) to {before[-1] + 1}"
+            f"bywire skips {counted(len(before), 'line')} before the table, from line "
+            f"{before[0] + 1} ({quoted(head.plain(before[0]).strip())}) to {before[-1] + 1}"
         )
         dialect = replace(dialect, notes=(note, *dialect.notes))
     return dialect
@@ -353,12 +353,12 @@ def _from_numbers(
         titles, units = _titles_of(rows[start], rows[alike[-1]] if has_units else [])
         notes += _doubtful_titles(titles, start)
         if _is_comment(head.plain(start)):
-            notes.append(f"bywire reads the comment in line {start + 1} as titles")
+            notes.append(f"bywire reads the comment in line {start + 1} as column titles")
     elif above and _has_decimal_commas(head, first, separator, width, rows[above[-1]]):
         raise FileError(
             f"{head.path}, line {first + 1}: commas separate the columns and are also decimal "
-            f"marks, because the {len(rows[above[-1]])} titles above have {width} cells below. "
-            "Export the table with semicolons or decimal points",
+            f"marks, because the {len(rows[above[-1]])} column titles above have {width} cells "
+            "below. Export the table with semicolons or decimal points",
             name=str(head.path),
         )
     elif above and above[-1] == begin:
@@ -405,8 +405,8 @@ def _doubtful_titles(titles: list[str], line: int) -> list[str]:
     if number is None:
         return []
     return [
-        f"bywire reads line {line + 1} as titles although it contains numbers ({quoted(number)}). "
-        "Set titles = false in the mapping to read it as a row"
+        f"bywire reads line {line + 1} as column titles although it contains numbers "
+        f"({quoted(number)}). Set titles = false in the mapping to read it as a row"
     ]
 
 

@@ -95,7 +95,7 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
         raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
     if len(data) > LARGEST:
         raise FileError(
-            f"{file} has more than {LARGEST // 1000} kB, which is too large for a {kind}"
+            f"{file} is larger than {LARGEST // 1000} kB, which is too large for a {kind}"
             f"{too_large}",
             name=str(file),
         )

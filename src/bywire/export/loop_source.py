@@ -7,17 +7,17 @@ from typing import Any
 
 import casadi as ca
 
-from bywire.analysis.linear.corners import beside_point
+from bywire.analysis.linear.corners import beside_point, on_stops
 from bywire.analysis.linear.linearize import closed_contacts, free_signals, smooth_point
 from bywire.analysis.linear.sampled_loops import frames_of
-from bywire.analysis.linear.smooth_functions import smooth_functions
+from bywire.analysis.linear.smooth_functions import SmoothPoint, smooth_functions
 from bywire.analysis.loop import Loop, Point
 from bywire.core.errors import BywireError
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph
 from bywire.simulation.stages import indented, leaf_namer, statements
-from bywire.simulation.symbols import SX, column, scalars
+from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
 
 _NOT_SYMBOLIC = (BywireError, TypeError, ValueError, ArithmeticError, RuntimeError)
 
@@ -34,14 +34,14 @@ class LoopSource:
         Name and C text of ``void entry(const double *p, double t, double *out)``. The function
         writes the nonzero entries of the model at the operating point (t = 0), or close to it on
         either side (t = 1, -1; see `bywire.analysis.linear.corners`). The order is the distance of
-        each contact from opening or closing [m], then A (n, n) and B (n, nm) of the plant row by
-        row, then for each task the memory's Jacobians with respect to the states (nm, n) and to
-        the memory (nm, nm). An analog loop has only A, because its sampled controllers hold their
-        outputs.
+        each contact from opening or closing [m], and of each stop operator from slip, then A (n, n)
+        and B (n, nm) of the plant row by row, then for each task the memory's Jacobians with
+        respect to the states (nm, n) and to the memory (nm, nm). An analog loop has only A, because
+        its sampled controllers hold their outputs.
     states, memory
         Names in the order of rows and columns. An analog loop has no memory.
     contacts
-        Number of contacts.
+        Number of these distances.
     every, frame
         Frames per tick of each task, and the length of a frame [s].
     """
@@ -95,7 +95,9 @@ def _jacobians(loop: Loop, at: Point, moving: Point, t: Any) -> list[Any]:
     x, m, u = (column(list(each)) for each in (moving.state, moving.memory, moving.stimulus))
     point = smooth_point(model, at.par, (at.state, at.memory, at.stimulus))
     states = [name for name in model.State._fields if name not in loop.locked]
-    beside = beside_point(point, free_signals(point, states, model.Memory._fields, ()))
+    free = free_signals(point, states, model.Memory._fields, ())
+    beside = beside_point(point, free)
+    point, _ = on_stops(point, free)
     x, m = x + t * beside[: len(at.state)], m + t * beside[len(at.state) :][: len(at.memory)]
     *matrices, gaps = _tuple(functions.contacts(x, p))
     closed = closed_contacts(model, at.par, at.state)
@@ -112,8 +114,8 @@ def _jacobians(loop: Loop, at: Point, moving: Point, t: Any) -> list[Any]:
         slack += [C[k, k] * force[k] if k in inside else left[k] for k in range(C.shape[0])]
         K[first:last, first:last] = block
         first = last
-    nothing, free = SX.zeros(len(model.frictions)), SX.ones(len(model.frictions))
-    A, B, *_ = functions.plant(x, m, p, K, nothing, free)
+    slack += _before_slip(point, moving, x, m, scalars(K @ gaps))
+    A, B, *_ = functions.plant(x, m, p, K, column(point.directions), column(point.moving))
     kept = [k for k, name in enumerate(model.State._fields) if name not in loop.locked]
     rows = [column(slack), _by_rows(A[kept, kept])]
     if loop.analog:
@@ -123,6 +125,20 @@ def _jacobians(loop: Loop, at: Point, moving: Point, t: Any) -> list[Any]:
         M_x, M_m, *_ = tick(x, m, u, p)
         rows += [_by_rows(M_x[:, kept]), _by_rows(M_m)]
     return rows
+
+
+def _before_slip(
+    point: SmoothPoint, moving: Point, x: Any, m: Any, contact: tuple[Any, ...]
+) -> list[Any]:
+    """Return the distance of each stop operator that follows its motion from its width."""
+    model = point.model
+    if not model.stops:
+        return []
+    state, memory = symbol_tuple(model.State, x), symbol_tuple(model.Memory, m)
+    widths = model.widths(state, state, memory, moving.par, contact)
+    follows = point.moving[len(model.frictions) :]
+    rows = zip(model.stops, widths, follows, strict=True)
+    return [width - ca.fabs(getattr(state, name)) for name, width, follow in rows if follow]
 
 
 def _in_c(entry: str, function: ca.Function) -> str:

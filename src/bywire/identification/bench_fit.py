@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.core.callers import option
-from bywire.core.errors import ParameterError, not_valid
+from bywire.core.errors import ParameterError, counted, not_valid
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
@@ -422,7 +422,8 @@ def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
     there = _finite(measured.data[name])
     if there.size < _FEWEST:
         raise ParameterError(
-            f"{name} has {there.size} samples, but the noise estimate needs at least {_FEWEST}",
+            f"{name} has {counted(there.size, 'sample')}, but the noise estimate needs at least "
+            f"{_FEWEST}",
             name=name,
             value=str(there.size),
             valid=str(_FEWEST),

@@ -20,6 +20,7 @@ from bywire.core.errors import (
     StepError,
     UnitError,
     by_likeness,
+    counted,
     nearest_first,
     unknown_name,
     unknown_of_few,
@@ -112,7 +113,7 @@ def _advice(argument: str, pairs: Sequence[tuple[str, str]]) -> str:
         f". {column} may also be {', '.join(models[1:][:_SHOWN])}"
         for column, models in list(several.items())[:1]
     )
-    return f"Type for example {option(argument, dict(list(typed.items())[:_SHOWN]))}{others}. "
+    return f"For example, type {option(argument, dict(list(typed.items())[:_SHOWN]))}{others}. "
 
 
 def _measured_first(data: xr.Dataset, signals: Iterable[str]) -> str:
@@ -253,9 +254,10 @@ def measured_run(
         if missing.size:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
-                f"{signal} drives the model, but lacks {missing.size} samples, the first at "
-                f"{at:.4g} s. Cut the record before the gap. Or fill the gap by interpolation with "
-                "'bywire convert IN OUT --rate RATE --exclude nothing', and use the converted file",
+                f"{signal} drives the model, but is missing {counted(missing.size, 'sample')}, "
+                f"the first at {at:.4g} s. Trim the record there, or fill the gap by "
+                "interpolation with 'bywire convert IN OUT --rate RATE --exclude nothing', and "
+                "use the converted file",
                 name=signal,
             )
     run = _run(bench, chosen, data, driven, between)

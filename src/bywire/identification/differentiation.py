@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.core.arguments import checked
-from bywire.core.errors import ParameterError, not_valid
+from bywire.core.errors import ParameterError, counted, not_valid
 from bywire.core.typing import Array
 from bywire.identification.measured import require_signals
 from bywire.identification.output_error import even_interval
@@ -48,7 +48,7 @@ def low_passed(values: Array, interval: float, cutoff: float) -> Array:
     pad = min(int(3.0 / (cutoff * interval)) + 1, len(values) - 1)
     if pad < _ORDER:
         raise ParameterError(
-            f"{len(values)} samples are too few for a low-pass filter",
+            f"a low-pass filter needs more than {counted(len(values), 'sample')}",
             name="samples",
             value=str(len(values)),
         )

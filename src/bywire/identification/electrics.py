@@ -104,8 +104,8 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
     demand, current = data[name].values, data[answer].values
     if not float(np.ptp(demand)) > 0.0:
         raise ParameterError(
-            f"{name} of record {label or '1'} does not change, so it determines neither winding "
-            "nor gains. Step it between several levels with the rotor locked",
+            f"{name} of record {label or '1'} does not change, so it determines neither the "
+            "winding nor the gains. Step it between several levels with the rotor locked",
             name=name,
         )
     together = float(np.corrcoef(demand, current)[0, 1]) if np.ptp(current) > 0.0 else 0.0

@@ -262,7 +262,7 @@ def _exceeding(best: Estimate, errors: Array) -> list[str]:
     half = 0.5 * np.diff(best.intervals(), axis=1).ravel()
     return [
         f"{u.label} has an error of about {shown(float(f'{error:.2g}'), difference_unit(u.unit))} "
-        "from the simulation step, more than the half width of its 95 % interval, "
+        "from the simulation step, more than the half-width of its 95 % interval, "
         f"{shown(float(f'{reach:.2g}'), difference_unit(u.unit))}. "
         "Use a smaller step"
         for u, error, reach in zip(best.unknowns, errors, half, strict=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bywire.core.arguments import checked
 from bywire.core.callers import option
-from bywire.core.errors import ParameterError, UnitError, unknown_name
+from bywire.core.errors import ParameterError, UnitError, counted, unknown_name
 from bywire.core.typing import Array, Progress, silent
 from bywire.data.alignment import resample
 from bywire.data.channel_quality import AlignmentReport
@@ -385,8 +385,9 @@ def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
         if missing.size:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
-                f"{where}: {name} is missing {missing.size} samples, the first at {at:.4g} s. Trim "
-                "the record there, or fill the gap with 'bywire convert --exclude nothing'",
+                f"{where}: {name} is missing {counted(missing.size, 'sample')}, the first at "
+                f"{at:.4g} s. Trim the record there, or fill the gap with 'bywire convert "
+                "--exclude nothing'",
                 name=str(name),
             )
 

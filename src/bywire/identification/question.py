@@ -314,7 +314,7 @@ def _with_texts(unknown: Unknown, within: str, prior: str, leaf: Leaf | None) ->
     low, high = _pair(unknown, within, within.split(".."), "range", "..")
     if not low < high:
         raise ParameterError(
-            f"range of {unknown.name}: {quoted(within)} is empty. Write the lower end first",
+            f"range of {unknown.name}: {quoted(within)} is empty. Write the lower bound first",
             name=f"range of {unknown.name}",
             value=quoted(within),
         )

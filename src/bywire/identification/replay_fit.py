@@ -21,7 +21,13 @@ from bywire.bench.requirements import Limit, Verdict, parted, read_limit, verdic
 from bywire.bench.step_error import with_step_errors
 from bywire.core import units
 from bywire.core.callers import option
-from bywire.core.errors import InputError, ParameterError, not_valid, unknown_name
+from bywire.core.errors import (
+    InputError,
+    ParameterError,
+    counted,
+    not_valid,
+    unknown_name,
+)
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Section
 from bywire.core.typing import Array
@@ -496,7 +502,7 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     if there.sum() < 2:
         raise ParameterError(
             f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, contains "
-            f"{int(there.sum())} samples, but at least two are needed",
+            f"{counted(int(there.sum()), 'sample')}, but at least two are needed",
             name=segment.name,
         )
     y, m = y[there], m[there]

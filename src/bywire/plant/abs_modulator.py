@@ -1,4 +1,4 @@
-"""Modulator of an anti-lock system on air, with a hold valve and a vent valve that lag."""
+"""Modulator of a pneumatic anti-lock system, with a hold valve and a vent valve that lag."""
 
 from __future__ import annotations
 

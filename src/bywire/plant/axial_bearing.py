@@ -1,4 +1,4 @@
-"""Preloaded axial bearings with friction due to preload, load, grease and Stribeck effect."""
+"""Preloaded axial bearings with friction due to preload, load, grease and the Stribeck effect."""
 
 from __future__ import annotations
 

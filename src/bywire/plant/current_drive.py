@@ -25,9 +25,9 @@ class Parameters(ParameterSet):
     """Continuous current controller with the PWM ripple (40 kHz) averaged out."""
 
     f_demand: Frequency
-    """corner frequency of the demand filter"""
+    """cutoff frequency of the demand filter"""
     f_sense: Frequency
-    """corner frequency of the current measurement filter"""
+    """cutoff frequency of the current measurement filter"""
     G_sense: Factor
     """scale of the current measurement; 1 if calibrated"""
     i_max: Current
@@ -46,7 +46,7 @@ class Parameters(ParameterSet):
 
 FAULTS = (
     ParameterFault("under-voltage", "reduced voltage at the power stage", ("V_dc",), 0.5),
-    ParameterFault("scale", "wrong scale of the current measurement", ("G_sense",), 0.5),
+    ParameterFault("scale", "gain error of the current measurement", ("G_sense",), 0.5),
     ParameterFault("derated", "reduced current limit", ("i_max",), 0.5),
 )
 

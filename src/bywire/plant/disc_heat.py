@@ -1,4 +1,4 @@
-"""Heat of a wheel brake: discs, pads, and calipers with fluid warm up, and pads fade."""
+"""Thermal model of a wheel brake: discs, pads, and calipers with fluid warm up, and pads fade."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
     tau_F: TimeConstant
     """ratio of damping to stiffness of sensor and screws"""
     f_F: Frequency
-    """corner frequency of the amplifier filter"""
+    """cutoff frequency of the amplifier filter"""
 
 
 class State(NamedTuple):

@@ -1,4 +1,4 @@
-"""Three-phase inverter averaged over the carrier, with dead time, voltage drops, held voltages."""
+"""Carrier-averaged three-phase inverter with dead time, voltage drops and zero-order hold."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class State(NamedTuple):
     """Pressure and its rate."""
 
     p: Pressure
-    p_rate: Annotated[float, Signal("Pa/s", "rate of the pressure", 1e8)]
+    p_rate: Annotated[float, Signal("Pa/s", "pressure rate", 1e8)]
 
 
 class Input(NamedTuple):
@@ -39,7 +39,7 @@ class Input(NamedTuple):
 class Rates(NamedTuple):
     """Derivatives of pressure and rate."""
 
-    p: Annotated[float, Signal("Pa/s", "rate of the pressure", 1e8)]
+    p: Annotated[float, Signal("Pa/s", "pressure rate", 1e8)]
     p_rate: Annotated[float, Signal("Pa/s**2", "acceleration of the pressure", 1e10)]
 
 

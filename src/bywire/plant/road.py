@@ -52,7 +52,7 @@ class Parameters(ParameterSet):
     further: SurfaceParameters
     """surface from x_change on"""
     grip: Factor
-    """factor on the adhesion of all surfaces"""
+    """scale factor for the adhesion of all surfaces"""
     x_change: Distance
     """start of the second surface, from the front wheel's position at time zero"""
     x_back: Distance

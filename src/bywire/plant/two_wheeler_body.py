@@ -39,7 +39,7 @@ class Parameters(ParameterSet):
     h: Length
     """height of the center of gravity"""
     h_a: Length
-    """height at which the air drag acts"""
+    """height at which air drag acts"""
     inertia: BodyInertia
     """pitch inertia about the center of gravity"""
     CdA: Annotated[float, Unit("m**2", 0.4), Field(ge=0, allow_inf_nan=False)]
@@ -253,5 +253,5 @@ def watch(t: Array, x: State, par: Parameters) -> list[str]:
     limit = _DEGREES * ops.arctan(par.l_f / par.h)
     pitch = _DEGREES * x.phi
     most = f" (pitch up to {highest(pitch):.3g} deg, limit {highest(limit):.3g} deg)"
-    text = "the rider goes over the handlebar: the center of gravity passes the front wheel"
+    text = "the rider goes over the handlebars: the center of gravity passes the front wheel"
     return first(t, pitch > limit, text, f"{most}, so the rest of the run is not a stop")

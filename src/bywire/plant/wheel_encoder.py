@@ -44,8 +44,8 @@ class Input(NamedTuple):
 class Reading(NamedTuple):
     """Registers of the capture unit."""
 
-    angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
-    age: Annotated[float, Signal("s", "time since the last edge", 1e-3)]
+    angle: Annotated[float, Signal("rad", "angle of the last encoder edge", 100.0)]
+    age: Annotated[float, Signal("s", "time since the last encoder edge", 1e-3)]
 
 
 def rate(u: Input) -> WheelSpeed:

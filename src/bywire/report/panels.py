@@ -33,6 +33,22 @@ class Role(Enum):
 _NO_PANEL = ("E_", "W_", "t_", "noise_")  # prefixes of names: cumulative signals, and noise
 _LINES = 2  # line styles of different set points in a panel
 _LONGEST = 20  # characters that fit along a low panel
+_SIMILAR = 50.0  # ratio of two signals' sizes beyond which one of them would look like zero
+_QUANTITIES = {
+    "N": "force",
+    "N*m": "torque",
+    "Pa": "pressure",
+    "m": "travel",
+    "m/s": "speed",
+    "rad": "angle",
+    "rad/s": "speed",
+    "A": "current",
+    "V": "voltage",
+    "W": "power",
+    "K": "temperature",
+    "m**3/s": "flow",
+}
+"""ordinates by SI unit, for signals whose labels have no word in common"""
 
 
 @checked
@@ -103,7 +119,7 @@ def declared_panels(recording: xr.Dataset) -> list[Panels]:
 
 
 def panels_by_unit(recording: xr.Dataset) -> tuple[Panel, ...]:
-    """Return panels for a recording of any model: signals of one unit, two per panel.
+    """Return panels for a recording of any model: signals of one unit and size, two per panel.
 
     A set point (attribute ``set_point_of``) is drawn with its signal. Cumulative signals (energies,
     times) and modes, which are 0 or 1, have no panel.
@@ -111,18 +127,32 @@ def panels_by_unit(recording: xr.Dataset) -> tuple[Panel, ...]:
     names = [str(name) for name in recording.data_vars if _is_drawn(recording, str(name))]
     targets = {name: str(recording[name].attrs.get("set_point_of", "")) for name in names}
     lines = [name for name in names if targets[name] not in names]
-    groups: dict[str, list[str]] = {}
+    groups: list[list[str]] = []
     for name in lines:
-        groups.setdefault(str(recording[name].attrs.get("units", "1")), []).append(name)
+        known = (group for group in groups if _fits(recording, group, name))
+        group = next(known, None)
+        if group is None:
+            groups.append([name])
+        else:
+            group.append(name)
     panels = []
-    for group in groups.values():
-        for first in range(0, len(group), _LINES):
-            shown = group[first : first + _LINES]
-            roles = zip(shown, (Role.MAIN, Role.SECOND), strict=False)
-            traces = [Trace(name, role) for name, role in roles]
-            traces += [Trace(n, Role.SET_POINT) for n in names if targets[n] in shown]
-            panels.append(Panel(_quantity(recording, shown), tuple(traces)))
+    for shown in groups:
+        roles = zip(shown, (Role.MAIN, Role.SECOND), strict=False)
+        traces = [Trace(name, role) for name, role in roles]
+        traces += [Trace(n, Role.SET_POINT) for n in names if targets[n] in shown]
+        panels.append(Panel(_quantity(recording, shown), tuple(traces)))
     return tuple(panels)
+
+
+def _fits(recording: xr.Dataset, group: Sequence[str], name: str) -> bool:
+    """Return whether a signal has the unit and the size of a group that has room."""
+    units = {recording[each].attrs.get("units", "1") for each in (*group, name)}
+    sizes = [_size(recording, each) for each in (*group, name)]
+    return len(group) < _LINES and len(units) == 1 and max(sizes) <= _SIMILAR * min(sizes)
+
+
+def _size(recording: xr.Dataset, name: str) -> float:
+    return float(np.nanmax(np.abs(recording[name].values), initial=0.0))
 
 
 def _is_drawn(recording: xr.Dataset, name: str) -> bool:
@@ -136,14 +166,16 @@ def _is_drawn(recording: xr.Dataset, name: str) -> bool:
 def _quantity(recording: xr.Dataset, names: Sequence[str]) -> str:
     """Return the label of an ordinate: a label, or the last words that two labels have in common.
 
-    If that is too long for a panel's height, the signals' names are used; the legend has the
-    labels.
+    Without common words, it is the quantity of the unit. If that is too long for a panel's height,
+    the signals' names are used; the legend has the labels.
     """
+    unit = str(recording[names[0]].attrs.get("units", "1"))
     labels = [clean(recording[name].attrs.get("long_name", name)).split() for name in names]
     shared: list[str] = []
     for words in zip(*(reversed(label) for label in labels), strict=False):
         if len(set(words)) > 1:
             break
         shared.insert(0, words[0])
-    text = " ".join(shared or labels[0])
+    other = labels[0] if len(labels) == 1 or unit not in _QUANTITIES else [_QUANTITIES[unit]]
+    text = " ".join(shared or other)
     return text if len(text) <= _LONGEST else ", ".join(names)

@@ -15,7 +15,7 @@ from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, counted
 from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
 from bywire.core.units import display_factor
@@ -51,7 +51,7 @@ class Response:
     def __post_init__(self) -> None:
         if np.shape(self.frequency) != np.shape(self.value):
             raise ParameterError(
-                f"response {self.label!r} has {np.size(self.value)} values for "
+                f"response {self.label!r} has {counted(np.size(self.value), 'value')} for "
                 f"{np.size(self.frequency)} frequencies. Pass one per frequency",
                 name=self.label,
                 value=str(np.size(self.value)),

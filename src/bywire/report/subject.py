@@ -133,7 +133,7 @@ def defaults_of(name: str) -> str:
 
 _ORIGINS = {
     "paper": "printed in a source",
-    "derived": "derived from printed ones",
+    "derived": "derived from other values",
     "calibrated": "calibrated to match a source",
     "chosen": "chosen without a source",
 }

@@ -272,7 +272,7 @@ def _require_one_unit(panel: Panel, recording: xr.Dataset, names: Sequence[str])
         if other.unit != first.unit:
             raise ParameterError(
                 f"panel {panel.quantity!r}: {other.name} is in {other.unit}, {first.name} in "
-                f"{first.unit}; put them into two panels",
+                f"{first.unit}. Put them in two panels",
                 name=other.name,
                 value=other.unit,
                 valid=first.unit,

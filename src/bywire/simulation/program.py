@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 
 from bywire.core.assembly import Assembly
-from bywire.core.errors import ModelError
+from bywire.core.errors import ModelError, counted
 from bywire.core.model import Model, require_states
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, signals_of
@@ -71,6 +71,8 @@ def _check_equations(model: Model, par: ParameterSet) -> None:
         )
     bounds = _evaluated(model, "bounds", x, x, m, symbolic, contact)
     _sized(model, "bounds", bounds, len(model.frictions), "one (low, high) per friction")
+    widths = _evaluated(model, "widths", x, x, m, symbolic, contact)
+    _sized(model, "widths", widths, len(model.stops), "one width per stop operator")
     for pair in bounds:
         _sized(model, "bounds", pair, 2, "pairs (low, high); check the comma in ((low, high),)")
 
@@ -105,8 +107,8 @@ def _sized(model: Model, part: str, value: Any, count: int, meaning: str) -> Non
     length = value.shape[0] if isinstance(value, ca.SX) else len(value) if value is not None else -1
     if length != count:
         raise ModelError(
-            f"{model.name}: {part} returns {max(length, 0)} values, but must return {count} "
-            f"({meaning})",
+            f"{model.name}: {part} returns {counted(max(length, 0), 'value')}, but must return "
+            f"{count} ({meaning})",
             name=part,
             value=str(max(length, 0)),
             valid=str(count),

@@ -7,7 +7,7 @@ terms with one Newton step. The scheme is of second order in smooth phases and t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -15,6 +15,7 @@ from typing import Any
 
 import casadi as ca
 
+from bywire.core.errors import ModelError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.contacts import overlaps, stiffness, violations
@@ -207,6 +208,101 @@ def solve_small(M: Any, b: Any) -> Any:
     return x
 
 
+# --- Stop operators
+# A stop operator's state z follows a motion, and slips at its width. Its force counts with its mean
+# over the motion. The stored energy and the loss, width times slip, are then exact, even in a
+# substep in which slip begins. This mean is a smooth function of the motion, so Newton's method
+# converges fast. The fast pass avoids it: an operator holds or slips for the whole substep.
+
+
+TINY = 1e-300  # positive where a stop operator does not move
+EVEN = 1e-12  # share of width and motion below which two states of a stop operator are equal
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A stop operator in a substep, during which its width changes linearly.
+
+    Parameters
+    ----------
+    start
+        State at the start.
+    first, last
+        Widths at start and end.
+    """
+
+    start: Any
+    first: Any
+    last: Any
+
+    def held_or_slipping(self, half: Any, assumed: Any) -> tuple[Stopped, Any]:
+        """Return the result of a motion, if the operator holds or slips for the whole substep.
+
+        Parameters
+        ----------
+        half
+            Half the motion.
+        assumed
+            The same for the motion that determines whether it slips, and where.
+
+        Returns
+        -------
+        tuple
+            The result, and a value that is positive if the operator does neither.
+        """
+        ahead, free = self.start + 2.0 * assumed, self.start + 2.0 * half
+        slips, is_up = ca.fabs(ahead) > self.last, ahead > 0
+        edge = ca.if_else(is_up, self.last, -self.last)
+        slip = free - edge
+        room = self.first - ca.if_else(is_up, self.start, -self.start)
+        # A predicted width is not exactly the width at the next start.
+        room = room - (EVEN * self.last + ca.fabs(self.last - self.first))
+        inward = ca.fmin(ca.if_else(is_up, -slip, slip), self.last)  # 0 without a width
+        doubt = ca.if_else(slips, ca.fmax(room, inward), ca.fabs(free) - self.last)
+        origin = ca.if_else(slips, 0.5 * (self.start + edge), self.start)
+        result = Stopped(
+            end=ca.if_else(slips, edge, free),
+            slip=ca.if_else(slips, slip, 0),
+            mean=ca.if_else(slips, origin, self.start + half),
+            slope=ca.if_else(slips, 0, 1),
+            origin=origin,
+        )
+        return result, doubt
+
+    def after(self, half: Any) -> Stopped:
+        """Return the result of a motion, given by its half."""
+        free = self.start + 2.0 * half
+        end = _within(free, -self.last, self.last)
+        slip = free - end
+        # A width below the state, for example after a change of a parameter, becomes effective
+        # during the substep.
+        first = ca.fmax(self.first, ca.fabs(self.start))
+        room = ca.if_else(slip > 0, first - self.start, first + self.start)
+        share = ca.fabs(slip) / ca.fmax(ca.fabs(slip) + room, TINY)
+        mean = self.start + (half - 0.5 * slip * share)
+        slope = (1.0 - share) * (1.0 - share)
+        return Stopped(end, slip, mean, slope, mean - slope * half)
+
+    def misfit(self, half: Any, assumed: Stopped, result: Stopped) -> Any:
+        """Return a positive value if a motion's mean is not on the assumed tangent."""
+        scale = self.first + ca.fabs(self.start) + ca.fabs(half)
+        return ca.fabs(result.mean - (assumed.origin + assumed.slope * half)) - EVEN * scale
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """State of a stop operator after a motion, its slip, and the mean of the state.
+
+    ``origin`` and ``slope``: tangent of the mean as a function of half the motion.
+    """
+
+    end: Any
+    slip: Any
+    mean: Any
+    slope: Any
+    origin: Any
+
+
 # --- Linear forms
 
 
@@ -249,7 +345,9 @@ class Form:
         return Form({}, SX(0)).plus(factor, self, x, changing)
 
 
-def forms(f: Any, J: Any, x: Any, changing: Any, curved: list[bool]) -> list[Form]:
+def forms(
+    f: Any, J: Any, x: Any, changing: Any, curved: list[bool], stops: Collection[int]
+) -> list[Form]:
     """Return the rows of f as forms.
 
     Parameters
@@ -262,6 +360,8 @@ def forms(f: Any, J: Any, x: Any, changing: Any, curved: list[bool]) -> list[For
         Symbols that change from substep to substep.
     curved
         Whether each row is nonlinear in x. Nonlinear rows stay unchanged.
+    stops
+        Entries of x with coefficients that change.
     """
     at_zero = ca.substitute(f, x, SX.zeros(x.shape[0]))
     rows = []
@@ -273,7 +373,7 @@ def forms(f: Any, J: Any, x: Any, changing: Any, curved: list[bool]) -> list[For
         for j in range(x.shape[0]):
             if J[i, j].is_zero():
                 continue
-            if depends(J[i, j], changing):
+            if j in stops or depends(J[i, j], changing):
                 moving = moving + J[i, j] * x[j]
             else:
                 fixed[j] = J[i, j]
@@ -450,12 +550,13 @@ class Pass:
     x, d
         State at the end of the substep and half its increment, shape (nx,) each.
     reaction
-        Forces of the frictions, then of the limits.
+        Forces of the frictions, then of the limits, then minus the slip speeds of the stop
+        operators.
     flow
         Rates of the integrals at the midpoint.
     doubt
         Positive if the pass must be repeated, because a contact set changed, a velocity crossed a
-        limit, or the projection of the frictions failed.
+        limit, the projection of the frictions failed, or a stop operator began or ceased to slip.
     jump
         Decrease of half the increment of each velocity with dry friction after a sign change, for
         the body's own mass, shape (m,).
@@ -509,7 +610,14 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     closed = gaps(y, y)
     K = stiffness(model, par, closed, exact)
     at_y = K @ closed
-    linear = _linearize(model, par, s, y, K, gaps)
+    stops = _stops(model, par, s, gaps)
+    moved = _moved(model, par, s, y, at_y, stops)
+    assumed = {
+        k: stop.after(moved[k]) if exact else stop.held_or_slipping(moved[k], moved[k])[0]
+        for k, stop in stops.items()
+    }
+    y = _replaced(y, {k: each.mean for k, each in assumed.items()})
+    linear = _linearize(model, par, s, y, K, gaps, moved, assumed)
     bounds = _bounds(model, par, s, y, at_y)
     mass = column(model.mass(symbol_tuple(model.State, y), par))
     rubbing = [_index(model, name) for name in model.frictions]
@@ -525,6 +633,17 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     x = column(
         [projection.w[kept.index(k)] if k in kept else middle[k] + d[k] for k in range(d.shape[0])]
     )
+    if exact:
+        stopped = {k: stop.after(d[k]) for k, stop in stops.items()}
+        misfits = [stop.misfit(d[k], assumed[k], stopped[k]) for k, stop in stops.items()]
+    else:
+        both = {k: stop.held_or_slipping(d[k], moved[k]) for k, stop in stops.items()}
+        stopped = {k: result for k, (result, _) in both.items()}
+        misfits = [misfit for _, misfit in both.values()]
+    x = _replaced(x, {k: each.end for k, each in stopped.items()})
+    middle = _replaced(middle, {k: each.mean for k, each in stopped.items()})
+    d = _replaced(d, {k: 0.5 * (each.end - s.x[k]) for k, each in stopped.items()})
+    reaction = ca.vertcat(reaction, *(-each.slip / s.h for each in stopped.values()))
     overlap = gaps(middle, y)
     contact = K @ overlap
     flow = model.powers(
@@ -538,6 +657,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     )
     doubts = violations(model, par, overlap, contact, exact)
     doubts.append(ca.if_else(projection.failed, 1, 0))
+    doubts += misfits
     if not exact:
         doubts += [-x[_index(model, name)] for name in model.limits]
     # Use a maximum instead of "or", because compilers do not vectorize selections of truth values.
@@ -557,10 +677,88 @@ def _turn(model: Model, start: Any, end: Any) -> Any:
     return turn
 
 
+def _stops(
+    model: Model, par: ParameterSet, s: Symbols, gaps: Callable[[Any, Any], Any]
+) -> dict[int, Stop]:
+    """Return the stop operators by the index of their state.
+
+    Raises
+    ------
+    ModelError
+        When overlaps of contacts depend on them.
+    """
+    if not model.stops:
+        return {}
+    memory = symbol_tuple(model.Memory, s.m)
+    places = [_index(model, name) for name in model.stops]
+    if depends(gaps(s.x, s.x), ca.vertcat(*(s.x[k] for k in places))):
+        raise ModelError(
+            f"{model.name}: overlaps of contacts depend on stop operators: use other states",
+            name="gap",
+            value=", ".join(model.stops),
+            valid="overlaps without stop operators",
+        )
+    widths = []
+    for x in (s.x, s.x + 2.0 * s.d):
+        overlap = gaps(x, x)
+        contact = stiffness(model, par, overlap, exact=True) @ overlap
+        state = symbol_tuple(model.State, x)
+        found = model.widths(state, state, memory, par, scalars(contact))
+        widths.append([ca.fmax(SX(width), 0) for width in found])
+    return {k: Stop(s.x[k], *pair) for k, *pair in zip(places, *widths, strict=True)}
+
+
+def _moved(
+    model: Model, par: ParameterSet, s: Symbols, y: Any, contact: Any, stops: Mapping[int, Stop]
+) -> dict[int, Any]:
+    """Return half the predicted motion of each stop operator.
+
+    Raises
+    ------
+    ModelError
+        When a motion depends on stop operators.
+    """
+    if not stops:
+        return {}
+    x, memory = symbol_tuple(model.State, y), symbol_tuple(model.Memory, s.m)
+    f = column(model.balance(x, x, memory, par, scalars(contact)))
+    mass = column(model.mass(x, par))
+    moved = {k: 0.5 * s.h * f[k] / mass[k] for k in stops}
+    own = ca.vertcat(*(s.x[k] for k in stops))
+    for name, half in zip(model.stops, moved.values(), strict=True):
+        if depends(half, own):
+            raise ModelError(
+                f"{model.name}: the rate of {name} depends on a stop operator, but it must be the "
+                "speed of a motion that other states determine",
+                name=name,
+                valid="a rate without stop operators",
+            )
+    return moved
+
+
+def _replaced(vector: Any, values: Mapping[int, Any]) -> Any:
+    """Return a column with other values at some places."""
+    if not values:
+        return vector
+    return column([values.get(k, vector[k]) for k in range(vector.shape[0])])
+
+
 def _linearize(
-    model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any, gaps: Callable[[Any, Any], Any]
+    model: Model,
+    par: ParameterSet,
+    s: Symbols,
+    y: Any,
+    K: Any,
+    gaps: Callable[[Any, Any], Any],
+    moved: Mapping[int, Any],
+    assumed: Mapping[int, Stopped],
 ) -> _Linearized:
     n = s.x.shape[0]
+    # The unknown of a stop operator is half its motion, of which its mean is a function. Its
+    # tangent continues to ``start``.
+    d = _replaced(s.d, moved)
+    slope = {k: each.slope for k, each in assumed.items()}
+    start = _replaced(s.x, {k: each.origin for k, each in assumed.items()})
     x, xe = SX.sym("x_", n), SX.sym("xe_", n)
     force = SX.sym("contact_", K.shape[0])
     state, fixed = symbol_tuple(model.State, x), symbol_tuple(model.State, xe)
@@ -570,22 +768,24 @@ def _linearize(
     curved = nonlinear(f, variables)[:n]
     bent = [any(nonlinear(f[i], variables)) for i in range(n)]
     pressed = K @ gaps(x, y)
-    at = column([y[k] if curved[k] else s.x[k] for k in range(n)])
+    at = column([y[k] if curved[k] else start[k] for k in range(n)])
     pressed = ca.densify(pressed)
     with_contact = ca.substitute(f, force, pressed)
     J = ca.jacobian(f, x) + ca.jacobian(f, force) @ ca.jacobian(pressed, x)
     J = ca.substitute(J, force, pressed)
     changing = ca.vertcat(x, xe, s.x, s.d)
     slopes = ca.substitute(J, ca.vertcat(x, xe), ca.vertcat(at, y))
+    for k, factor in slope.items():
+        slopes[:, k] = slopes[:, k] * factor
     rows = []
-    for i, row in enumerate(forms(with_contact, J, x, changing, bent)):
+    for i, row in enumerate(forms(with_contact, J, x, changing, bent, moved)):
         # Linear rows start from x. Other rows were evaluated at the predicted midpoint of the
         # states in which they are nonlinear, so this part of J d must be subtracted.
-        point = at if bent[i] else s.x
+        point = at if bent[i] else start
         rest = ca.substitute(row.rest, ca.vertcat(x, xe), ca.vertcat(point, y))
         if bent[i]:
             for j in range(n):
-                rest = rest - slopes[i, j] * s.d[j] if curved[j] else rest
+                rest = rest - slopes[i, j] * d[j] if curved[j] else rest
         fixed = {j: ca.substitute(c, xe, y) for j, c in row.coefficients.items()}
         rows.append(Form(fixed, rest))
     return _Linearized(rows, slopes)

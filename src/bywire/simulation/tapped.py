@@ -1,4 +1,4 @@
-"""Model with taps that can falsify signals, and with tasks that can miss ticks.
+"""Model with taps that can corrupt signals, and with tasks that can miss ticks.
 
 Sensor readings, demands and controller outputs pass through a *tap*. A tap returns ``(1 + gain) y +
 offset``, its last value if it is stuck, or its input a number of ticks ago. Gains, offsets and
@@ -23,7 +23,7 @@ DEAD = 2.0
 
 
 class Tap(NamedTuple):
-    """Tap of a signal, which can falsify the signal.
+    """Tap of a signal, which can corrupt the signal.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Tap(NamedTuple):
     late: int = 0
 
     def controls(self) -> dict[str, str]:
-        """Return the names of the stimuli that falsify the signal, by their effect."""
+        """Return the names of the stimuli that corrupt the signal, by their effect."""
         kinds = ("gain", "offset", "held", "late") if self.late else ("gain", "offset", "held")
         return {kind: f"tap_{self.name}_{kind}" for kind in kinds}
 
@@ -70,7 +70,7 @@ class Tapped(Wrapping):
     inner
         The model without taps.
     taps
-        Taps of the signals that can be falsified.
+        Taps of the signals that can be corrupted.
     resting
         Names of the tasks that can miss ticks.
     """
@@ -164,7 +164,7 @@ class Tapped(Wrapping):
         return self.Memory(*after, **{**kept, **last})
 
     def _inside_range(self, field: str, demand: Any) -> Any:
-        """Return a falsified demand within its range: a switch has only two positions."""
+        """Return a corrupted demand within its range: a switch has only two positions."""
         low, high = ranges_of(self.inner.Stimulus).get(field, (-math.inf, math.inf))
         above = demand if low == -math.inf else ops.fmax(demand, low)
         return above if high == math.inf else ops.fmin(above, high)

@@ -434,7 +434,7 @@ def weights_of(where: str, section: Mapping[str, Any], count: int) -> Array:
 # --- Distributions in study files: a tolerance, or a section with ``kind``
 
 _NEXT = {
-    "tolerance": "Use a narrower tolerance, or kind 'uniform' with ends within this range",
+    "tolerance": "Use a narrower tolerance, or kind 'uniform' with bounds within this range",
     "uniform": "Choose 'low' and 'high' within this range",
     "normal": "Truncate the distribution with 'low' or 'high' within this range",
     "log-normal": "Use another 'median' or a smaller 'sd'",
@@ -487,7 +487,7 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
     for end in (low, high):
         if math.isfinite(end) and not leaf.admits(end):
             raise ParameterError(
-                f"{where}: {made.text}. Its end at {shown(end, leaf.unit.symbol)} is not valid: "
+                f"{where}: {made.text}. Its bound at {shown(end, leaf.unit.symbol)} is not valid: "
                 f"it must be {valid}. {advice}",
                 name=where,
                 value=shown(end, leaf.unit.symbol),
@@ -754,7 +754,7 @@ def _tolerance(entry: _Entry) -> Distribution:
     if shape != "normal":
         raise unknown_name(f"shape of {entry.where}", str(shape), ("uniform", "normal"))
     law = truncated_normal(-3.0, 3.0, entry.nominal, width / 3.0)
-    return _frozen(entry, law, f"{text}, normal with 3 sd at the ends", low, high)
+    return _frozen(entry, law, f"{text}, normal with bounds at 3 sd", low, high)
 
 
 def _normal(entry: _Entry) -> Distribution:
@@ -772,7 +772,7 @@ def _normal(entry: _Entry) -> Distribution:
     if kept < NEVER:
         raise entry.refused(
             f"only {kept:.2g} of the distribution ({text}) is between low and high, which is too "
-            "little for sampling. Choose other ends or another mean"
+            "little for sampling. Choose other bounds or another mean"
         )
     cut = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
     sides = [

@@ -132,7 +132,7 @@ def _require_agreement(plan: StudyPlan) -> None:
         why = (
             "exchanges quantities one at a time, so they must be independent"
             if is_indexed
-            else "visits the ends of each quantity separately"
+            else "visits the bounds of each quantity separately"
         )
         raise ParameterError(
             f"[[correlation]] is not possible: {plan.design!r} {why}. Remove it, or use {others}",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
+from bywire.core.errors import ParameterError, counted, not_valid, quoted, unknown_name
 from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.data.file_format import library
@@ -85,7 +85,7 @@ class Surrogate:
         """
         if not isinstance(values, Mapping):
             raise ParameterError(
-                f"{quoted(values)} must be SI numbers by the names of quantities, such as "
+                f"{quoted(values)} must map names of quantities to numbers in SI units, such as "
                 f"{{{next(iter(self.nominal))!r}: {next(iter(self.nominal.values())):g}}}"
             )
         for name in values:
@@ -183,8 +183,8 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
     x, y = np.column_stack(list(columns.values()))[known], y[known]
     if y.size < _FEWEST:
         raise ParameterError(
-            f"{kpi} is defined in only {y.size} cases, but a surrogate needs at least {_FEWEST}. "
-            "Extend the study",
+            f"{kpi} is defined in only {counted(y.size, 'case')}, but a surrogate needs at least "
+            f"{_FEWEST}. Extend the study",
             name=kpi,
             value=str(y.size),
             valid=f"at least {_FEWEST}",

@@ -177,7 +177,7 @@ def _read_measured(path: Path) -> Measured:
         return _joined(list(_estimates(content["estimates"])))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FileError(
-            f"{file} contains no estimates of an identification ({type(error).__name__}: "
+            f"{file} contains no estimates from an identification ({type(error).__name__}: "
             f"{quoted(str(error))}). Specify the folder that 'bywire identify --out' created",
             name=str(file),
         ) from None

@@ -29,7 +29,9 @@ Exclude = Annotated[
         is_listing=True,
     ),
 ]
-MaxGap = Annotated[str, Ask("Longest pause not treated as a gap, e.g. '50 ms'. Default: 10 steps.")]
+MaxGap = Annotated[
+    str, Ask("Longest interval not treated as a gap, e.g. '50 ms'. Default: 10 steps.")
+]
 Format = Annotated[str, Ask("Output format, e.g. mat73. Default: inferred from the file name.")]
 Force = Annotated[bool, Ask("Overwrite an existing file.")]
 
@@ -72,7 +74,7 @@ def convert(
     exclude
         Samples to exclude: ``gaps``, ``missing``, ``clipped``. Default: ``gaps`` and ``missing``.
     max_gap
-        Longest pause not treated as a gap, for example ``"50 ms"``. Default: 10 steps.
+        Longest interval not treated as a gap, for example ``"50 ms"``. Default: 10 steps.
     format
         Output format, for example ``mat73``. Default: inferred from the file name's suffix.
     force

@@ -122,7 +122,7 @@ class HotCorner(Corner[ParT, MemoryT]):
     )
 
     E_friction = Shown(
-        "J", "friction of the brake that warms up", role=Role("source", "brake", book=HEAT_BOOK)
+        "J", "friction work of the warm brake", role=Role("source", "brake", book=HEAT_BOOK)
     )
     E_discs = Shown("J", "heat in the disc", role=heat_sink("disc"))
     E_pads = Shown("J", "heat in the pads", role=heat_sink("pads"))

@@ -259,7 +259,7 @@ class HotBrakes(TwoWheeler[ParT, MemoryT]):
     )
 
     E_friction = Shown(
-        "J", "friction of the brakes that warm up", role=Role("source", "brakes", book=HEAT_BOOK)
+        "J", "friction work of the warm brakes", role=Role("source", "brakes", book=HEAT_BOOK)
     )
     E_discs = Shown("J", "heat in the discs", role=heat_sink("discs"))
     E_pads = Shown("J", "heat in the pads", role=heat_sink("pads"))

@@ -293,9 +293,11 @@ def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
             f"motion with {option('side', 'above')}",
             name=names,
         )
+    point, slipping = on_stops(of.point, of.free)
+    of = replace(of, point=point)
     corner = _Corner(of)
     models = corner.chosen() if corner.is_near() else of.models(of.point)
-    texts = tuple(f"above the limit of {name}" for name in limits)
+    texts = (*(f"above the limit of {name}" for name in limits), *slipping)
     return tuple(replace(each, corners=texts + each.corners) for each in models)
 
 
@@ -305,6 +307,55 @@ def _limits_reached(of: Linearization) -> list[str]:
     fields, usual = point.model.State._fields, magnitudes(point)
     places = {name: fields.index(name) for name in point.model.limits}
     return [name for name, k in places.items() if of.free[k] and point.state[k] <= REACH * usual[k]]
+
+
+def on_stops(point: SmoothPoint, free: NDArray[np.bool_]) -> tuple[SmoothPoint, tuple[str, ...]]:
+    """Return a point whose free stop operators at their widths are on the stated side.
+
+    Returns
+    -------
+    tuple
+        The point, and texts with the side of each of these stop operators.
+
+    Raises
+    ------
+    CornerError
+        When no side is stated.
+    """
+    side = _STATED.get().usual
+    reached = _widths_reached(point, free) if point.model.stops else {}
+    if not reached:
+        return point, ()
+    beside = point.moved(beside_point(point, free)).widths()
+    kinks = [each for each, width in reached.items() if width or beside[each]]
+    if kinks and not side:
+        names = ", ".join(kinks)
+        raise CornerError(
+            f"{point.model.name}: at the operating point, {names} is at its width: it slips "
+            "outward, and follows its motion inward. Choose another operating point, or one side: "
+            f"{option('side', 'above')}, it slips, or {option('side', 'below')}, it follows",
+            name=names,
+        )
+    # Without a width, it has no effect.
+    slipping = reached if side == ABOVE else reached.keys() - {*kinks}
+    first, moving = len(point.model.frictions), list(point.moving)
+    for each in slipping:
+        moving[first + point.model.stops.index(each)] = 0.0
+    how = "slips" if side == ABOVE else "follows"
+    texts = tuple(f"{each} {how} at its width" for each in kinks)
+    return replace(point, moving=moving), texts
+
+
+def _widths_reached(point: SmoothPoint, free: NDArray[np.bool_]) -> dict[str, float]:
+    """Return the free stop operators at their widths, with these widths."""
+    fields, usual = point.model.State._fields, magnitudes(point)
+    places = {name: fields.index(name) for name in point.model.stops}
+    widths = point.widths()
+    return {
+        name: widths[name]
+        for name, k in places.items()
+        if free[k] and abs(point.state[k]) >= widths[name] - REACH * usual[k]
+    }
 
 
 class _Corner:

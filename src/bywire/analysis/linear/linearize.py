@@ -49,7 +49,8 @@ def linearize(
 
     Valid for small motions in which no contact opens or closes, away from one-sided limits.
     Closed contacts act with their stiffness and damping. Dry friction is set-valued and has no
-    derivative at rest.
+    derivative at rest. A stop operator within its width follows its motion. At its width, it slips
+    outward and follows inward, so it needs a side, "above" or "below".
 
     Parameters
     ----------
@@ -128,7 +129,8 @@ def free_signals(
 ) -> NDArray[np.bool_]:
     """Return a mask of the listed fields that do not stick, over state, memory and stimulus."""
     model = point.model
-    stuck = [name for name, g in zip(model.frictions, point.moving, strict=True) if not g]
+    rows = zip((*model.frictions, *model.stops), point.moving, strict=True)
+    stuck = [name for name, g in rows if not g]
     moving = {*states} - {*stuck}
     pairs = ((model.State, moving), (model.Memory, memory), (model.Stimulus, stimulus))
     return np.array([name in free for kind, free in pairs for name in kind._fields], dtype=bool)
@@ -200,11 +202,15 @@ def _rows(model: Model, outputs: Sequence[str], C: Array, D: Array) -> tuple[Arr
 def _frictions(
     model: Model, state: NamedTuple, friction: Friction | Mapping[str, Friction]
 ) -> tuple[list[float], list[float]]:
-    """Return every friction's direction (0 if removed), and 0 for each velocity that sticks."""
+    """Return every friction's direction (0 if removed), and 0 for each velocity that sticks.
+
+    Stop operators follow their motions.
+    """
     if isinstance(friction, str):
         friction = dict.fromkeys(model.frictions, friction)
     _require_known("velocity with friction", tuple(friction), model.frictions)
-    directions, moving = [0.0 for _ in model.frictions], [1.0 for _ in model.frictions]
+    directions = [0.0 for _ in model.frictions]
+    moving = [1.0 for _ in (*model.frictions, *model.stops)]
     for k, name in enumerate(model.frictions):
         kind = friction.get(name, "removed")
         if kind == "sliding":
@@ -348,7 +354,7 @@ def equilibrium(
     state, memory
         Start of the search.
     given
-        States that keep their value and therefore determine the equilibrium.
+        States that keep their value and therefore determine the equilibrium. So do stop operators.
     inputs
         Fields of Memory that may change to hold the system there.
     running
@@ -370,7 +376,7 @@ def equilibrium(
     magnitudes scale the signals.
     """
     known = signals_of(model.State) | signals_of(model.Memory)
-    fixed = (*given, *running, *tied[1:])
+    fixed = (*given, *running, *tied[1:], *model.stops)
     free = [k for k, name in enumerate(model.State._fields) if name not in fixed]
     still = [k for k, name in enumerate(model.State._fields) if name not in running]
     names = [*(model.State._fields[k] for k in free), *inputs]

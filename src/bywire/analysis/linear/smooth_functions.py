@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import Lock
@@ -33,7 +33,8 @@ class SmoothFunctions:
     plant
         ``(x, m, p, K, s, g) -> (A, B, C, D, rate, y)`` with the stiffness K of closed contacts,
         the direction s of each friction (0: removed) and g, which is 0 for each stuck velocity and
-        1 otherwise. B and D are for the whole Memory, C, D and y for the whole Output.
+        each slipping stop operator, and 1 otherwise. B and D are for the whole Memory, C, D and y
+        for the whole Output.
     ticks
         ``(x, m, u, p) -> (d/dx, d/dm, d/du, new)``: each task's new memory and its Jacobians.
     reads
@@ -130,14 +131,32 @@ def _plant(
     require_states(model)
     K = ca.SX.sym("K", gap.shape[0], gap.shape[0])
     s = ca.SX.sym("s", len(model.frictions))
-    g = ca.SX.sym("g", len(model.frictions))
+    g = ca.SX.sym("g", len(model.frictions) + len(model.stops))
     contact = tuple(_split(K @ gap))
-    rates, outputs = equations(model, par, (x, held), contact, _split(s), _split(g))
+    growth = _growth(model, par, (x, held), contact, symbols[0])
+    rates, outputs = equations(model, par, (x, held), contact, _split(s), _split(g), growth=growth)
     rate, y = _column(rates), _column(outputs)
     parts = [ca.jacobian(a, b) for a in (rate, y) for b in symbols[:2]]
     results = [ca.densify(each) for each in (*parts, rate, y)]
     function = ca.Function("plant", [*symbols, K, s, g], results)
     return function, (_pattern(parts[0]), _pattern(parts[1]))
+
+
+def _growth(
+    model: Model, par: ParameterSet, at: tuple[Any, Any], contact: tuple[Any, ...], symbols: Any
+) -> Callable[[list[Any]], list[Any]]:
+    """Return the function from the states' rates to the rates of slipping stop operators."""
+    import casadi as ca
+
+    x, held = at
+    widths = _column(list(model.widths(x, x, held, par, contact)))
+    signs = [ca.sign(getattr(x, name)) for name in model.stops]
+
+    def growth(rates: list[Any]) -> list[Any]:
+        grown = _split(ca.jtimes(widths, symbols, _column(rates))) if model.stops else []
+        return [sign * each for sign, each in zip(signs, grown, strict=True)]
+
+    return growth
 
 
 def _pattern(matrix: Any) -> NDArray[np.bool_]:
@@ -156,6 +175,7 @@ def equations(
     moving: Sequence[Any],
     *,
     outputs: bool = True,
+    growth: Callable[[list[Any]], list[Any]] | None = None,
 ) -> tuple[list[Any], list[Any]]:
     """Return rates and outputs of a model's smooth part, on numbers of any kind.
 
@@ -168,13 +188,16 @@ def equations(
     contact
         Forces of the contacts.
     directions, moving
-        For each friction, its direction (0 if it is removed), and 0 if its velocity is stuck.
+        For each friction, its direction (0 if it is removed), and 0 if its velocity is stuck. Then
+        0 for each stop operator that slips.
     outputs
         Whether to compute outputs.
+    growth
+        ``growth(rates)``: rates of slipping stop operators, from the states' rates. Default: zero.
     """
     x, held = at
     force = dict(zip(x._fields, model.balance(x, x, held, par, contact), strict=True))
-    reaction: list[Any] = [0.0] * (len(model.frictions) + len(model.limits))
+    reaction: list[Any] = [0.0] * len((*model.frictions, *model.limits, *model.stops))
     bounds = model.bounds(x, x, held, par, contact)
     for k, (name, (low, high)) in enumerate(zip(model.frictions, bounds, strict=True)):
         s = directions[k]
@@ -182,6 +205,12 @@ def equations(
         force[name] = moving[k] * (force[name] + reaction[k])
     mass = model.mass(x, par)
     rates = [force[name] / getattr(mass, name) for name in x._fields]
+    slipping = [0.0 for _ in model.stops] if growth is None else growth(rates)
+    for k, (name, rate) in enumerate(zip(model.stops, slipping, strict=True), len(model.frictions)):
+        place = x._fields.index(name)
+        lost = (1.0 - moving[k]) * (rates[place] - rate)
+        reaction[k + len(model.limits)] = -lost
+        rates[place] = rates[place] - lost
     if not outputs:
         return rates, []
     flow = zeros(cast(Any, model.Flow))
@@ -245,6 +274,17 @@ class SmoothPoint:
             self.directions,
             self.moving,
         )
+
+    def widths(self) -> dict[str, float]:
+        """Return the widths of the stop operators by name."""
+        if not self.model.stops:
+            return {}
+        x = cast(Any, self.model.State)(*self.state.tolist())
+        memory = cast(Any, self.model.Memory)(*self.memory.tolist())
+        gaps = [d for group in self.model.gap(x, x, self.par) for d in group]
+        contact = tuple((self.K @ np.array(gaps)).tolist()) if gaps else ()
+        found = self.model.widths(x, x, memory, self.par, contact)
+        return dict(zip(self.model.stops, map(float, found), strict=True))
 
     def ticks(self) -> list[list[Array]]:
         """Return each task's Jacobians for state, memory and stimulus, and the new memory."""

@@ -150,7 +150,7 @@ def contact_forces(model: Model, x: Any, par: Any) -> tuple[float, ...]:
         else:
             raise ParameterError(
                 f"{model.name}: the contact forces do not converge in this state. Choose other "
-                "levels or another friction",
+                "levels or another friction law",
                 name=model.name,
             )
         forces += F.tolist()

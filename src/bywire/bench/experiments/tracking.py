@@ -62,7 +62,7 @@ def build(tested: TestedModel) -> Experiment:
 
 GENERIC = GenericExperiment(
     name="tracking",
-    summary="tracking of a moving set point by any output, for example of a table from a file",
+    summary="any output follows a moving set point, for example a table from a file",
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={"duration": 1.0, "record": 1e-3, "settle": 0.0, "smoothing": 0.0},

@@ -266,8 +266,8 @@ def require_admissible(mode: Mode, value: float, where: str) -> None:
     ParameterError
         With the range. The parameters themselves check the values of modes that change them.
     """
-    low, high = _RANGES.get(mode.falsified, (-math.inf, math.inf))
-    is_whole = mode.falsified in ("late", "dropped")
+    low, high = _RANGES.get(mode.corrupted, (-math.inf, math.inf))
+    is_whole = mode.corrupted in ("late", "dropped")
     if not low <= value <= high or (is_whole and value % 1):
         unit = "" if mode.unit == "1" else f" {mode.unit}"
         kind = "a whole number " if is_whole else ""

@@ -1,4 +1,4 @@
-"""Faults in a run: taps in its model, falsified signals, and changed parameters."""
+"""Faults in a run: taps in its model, corrupted signals, and changed parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from bywire.bench.experiment import Case, FaultyCase
 from bywire.bench.faults.fault_section import MOST, Course, Injection, injections
-from bywire.bench.faults.modes import Mode, falsify, missed
+from bywire.bench.faults.modes import Mode, corrupt, missed
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
@@ -59,7 +59,7 @@ def with_faults(cases: Sequence[Case], sections: Sequence[Mapping[str, Any]]) ->
 
 
 def _require_within(fault: str, course: Course, first: float, last: float) -> None:
-    """Reject a fault that is absent, or returns too often, between the ends of the runs [s]."""
+    """Reject a fault that is absent, or recurs too often, between the ends of the runs [s]."""
     if course.onset >= last:
         raise ParameterError(
             f"{fault} begins at {course.onset:g} s, but the run ends at {last:g} s. Set an earlier "
@@ -77,7 +77,7 @@ def _require_within(fault: str, course: Course, first: float, last: float) -> No
         )
     if course.returns(first, last) > MOST:
         raise ParameterError(
-            f"{fault} returns every {course.every:g} s, more than {MOST} times before {last:g} s. "
+            f"{fault} recurs every {course.every:g} s, more than {MOST} times before {last:g} s. "
             "Set a longer period (every), or make the fault permanent",
             name="every",
             value=f"{course.every:g} s",
@@ -99,8 +99,8 @@ def taps_of(faults: Sequence[Injection]) -> tuple[tuple[Tap, ...], tuple[str, ..
             before = taps.get(tap.name, tap)
             if before.late and tap.late and before.late != tap.late:
                 raise ParameterError(
-                    f"faults {fault.mode.name} have different values, {before.late} and {tap.late} "
-                    "ticks, in one run. Set both to the same value",
+                    f"in one run, faults {fault.mode.name} have different values, "
+                    f"{before.late} and {tap.late} ticks. Set both to the same value",
                     name=fault.mode.name,
                     value=str(tap.late),
                     valid=str(before.late),
@@ -142,11 +142,11 @@ def injected(
         return FaultyCase(**plain, changes=changes)
     model = Tapped(case.model, taps, tasks)
     plain |= {"model": model, "memory": model.started(case.state, case.memory), "start": None}
-    falsified = _falsified(faults, case, {tap.name: tap for tap in taps})
-    return FaultyCase(**plain, changes=changes, falsified=falsified)
+    corrupted = _corrupted(faults, case, {tap.name: tap for tap in taps})
+    return FaultyCase(**plain, changes=changes, corrupted=corrupted)
 
 
-def _falsified(
+def _corrupted(
     faults: Sequence[Injection], case: Case, taps: Mapping[str, Tap]
 ) -> Callable[[Array], dict[str, Array]]:
     periods = {task.name: task.period for task in case.model.tasks(case.par)}
@@ -162,7 +162,7 @@ def _falsified(
             tap = mode.tap(fault.value)
             if tap is not None:
                 names = taps[tap.name].controls()
-                each = falsify(mode, fault.value, size, since, case.par, draws)
+                each = corrupt(mode, fault.value, size, since, case.par, draws)
                 given = {names[kind]: values for kind, values in each.items()}
             elif mode.task:
                 period = periods[mode.task]

@@ -37,9 +37,9 @@ class Mode:
     changes
         ``changes(par, value)``: changed parameters by dotted name; None for other kinds of modes.
     channel
-        Falsified signal.
-    falsified
-        Kind of falsification (see `falsify` and `missed`).
+        Corrupted signal.
+    corrupted
+        Kind of corruption (see `corrupt` and `missed`).
     task
         Controller that misses its ticks.
     needs
@@ -52,7 +52,7 @@ class Mode:
     value: float = 0.0
     changes: Changes | None = field(default=None, compare=False)
     channel: Channel | None = None
-    falsified: str = ""
+    corrupted: str = ""
     task: str = ""
     needs: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
@@ -66,11 +66,11 @@ class Mode:
         return {name: wanted for name, wanted in self.needs.items() if par.value(name) != wanted}
 
     def tap(self, value: float) -> Tap | None:
-        """Return the tap that the mode needs; None if the mode does not falsify a signal."""
+        """Return the tap that the mode needs; None if the mode does not corrupt a signal."""
         if self.channel is None:
             return None
         c = self.channel
-        late = round(value) if self.falsified == "late" else 0
+        late = round(value) if self.corrupted == "late" else 0
         return Tap(_identifier(c.name), c.side, c.signal, c.task, late)
 
 
@@ -142,7 +142,7 @@ def _every(model: Model, par: ParameterSet) -> Iterator[Mode]:
                 f"task {task.name} {summary}",
                 _unit(kind, ""),
                 value,
-                falsified=name,
+                corrupted=name,
                 task=task.name,
             )
     for each in failures_of(model):
@@ -177,7 +177,17 @@ def _demands(model: Model, declared: Collection[str]) -> Iterator[Channel]:
     """Yield a channel for every demand without a declared channel."""
     for name, signal in signals_of(model.Stimulus).items():
         if not name.startswith("noise_") and name not in declared:
-            yield Channel(name, signal.label, signal.unit, name, "demand", offset=signal.nominal)
+            summary = _label_first(model, signal.label)
+            yield Channel(name, summary, signal.unit, name, "demand", offset=signal.nominal)
+
+
+def _label_first(model: Model, label: str) -> str:
+    """Return a signal's label with the label of its inner assembly first, as in a sentence."""
+    for sub in _subs(model):
+        ending = f", {sub.label}"
+        if label.endswith(ending):
+            return f"{sub.label}: {label.removesuffix(ending)}"
+    return label
 
 
 def _of_channel(channel: Channel, tasks: Collection[str]) -> Iterator[Mode]:
@@ -192,7 +202,7 @@ def _of_channel(channel: Channel, tasks: Collection[str]) -> Iterator[Mode]:
             _unit(kind, channel.unit),
             value.get(kind, _VALUES.get(kind, 0.0)),
             channel=channel,
-            falsified=name,
+            corrupted=name,
         )
 
 
@@ -207,10 +217,10 @@ def _identifier(name: str) -> str:
     return name.replace("-", "_").replace(".", "_")
 
 
-def falsify(
+def corrupt(
     mode: Mode, value: float, size: Array, since: Array, par: Any, draws: np.random.Generator
 ) -> dict[str, Array]:
-    """Return the inputs of a falsified signal's tap at every row of the stimulus, by kind.
+    """Return the inputs of a corrupted signal's tap at every row of the stimulus, by kind.
 
     Parameters
     ----------
@@ -228,21 +238,21 @@ def falsify(
     seen = channel.seen or (lambda y, _: y)
     zero = seen(0.0, par)
     slope = seen(1.0, par) - zero
-    if mode.falsified == "stuck":
+    if mode.corrupted == "stuck":
         return {"gain": -size, "offset": size * seen(value, par)}
-    if mode.falsified == "gain":
+    if mode.corrupted == "gain":
         return {"gain": (value - 1.0) * size, "offset": (1.0 - value) * zero * size}
-    if mode.falsified == "swapped":
+    if mode.corrupted == "swapped":
         return {"gain": -2.0 * size, "offset": 2.0 * zero * size}
-    if mode.falsified == "offset":
+    if mode.corrupted == "offset":
         return {"offset": slope * value * size}
-    if mode.falsified == "drift":
+    if mode.corrupted == "drift":
         return {"offset": slope * value * size * np.maximum(since, 0.0)}
-    if mode.falsified == "noise":
+    if mode.corrupted == "noise":
         return {"offset": slope * value * size * draws.standard_normal(size.size)}
-    if mode.falsified == "dropout":
+    if mode.corrupted == "dropout":
         return {"held": np.where(draws.random(size.size) < value, size > 0, 0.0)}
-    if mode.falsified == "late":
+    if mode.corrupted == "late":
         return {"late": np.where(size > 0, 1.0, 0.0)}
     return {"held": np.where(size > 0, 1.0, 0.0)}  # lost, stuck-at-last
 
@@ -254,13 +264,13 @@ def missed(
 
     ``since``: time since the onset [s], at every row; ``period``: period of the task [s].
     """
-    if mode.falsified == "dropped":
+    if mode.corrupted == "dropped":
         return np.where(np.mod(np.round(since / period), round(value)) != 0, size > 0, 0.0)
-    if mode.falsified == "dead":
+    if mode.corrupted == "dead":
         return np.where(size > 0, DEAD, 0.0)
-    if mode.falsified == "restarted":
+    if mode.corrupted == "restarted":
         return np.where((size > 0) & (since < value - TOLERANCE), DEAD, 0.0)
-    if mode.falsified == "missed":
+    if mode.corrupted == "missed":
         return np.where(draws.random(size.size) < value, size > 0, 0.0)
     return np.where(size > 0, 1.0, 0.0)
 

@@ -169,13 +169,13 @@ def disc_energy(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float:
 
 @measure("1")
 def peak_slip_front(stop: Stop, slip_front: Samples) -> float:
-    """Largest slip at speeds above 2.5 m/s."""
+    """Maximum slip at speeds above 2.5 m/s."""
     return _peak_slip(stop, slip_front)
 
 
 @measure("1")
 def peak_slip_rear(stop: Stop, slip_rear: Samples) -> float:
-    """Largest slip at speeds above 2.5 m/s."""
+    """Maximum slip at speeds above 2.5 m/s."""
     return _peak_slip(stop, slip_rear)
 
 

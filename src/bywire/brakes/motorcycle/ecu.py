@@ -39,7 +39,7 @@ class Memory(NamedTuple):
     sat_duty: Annotated[float, Signal("1", "duty cycle saturated")]
     pid_integral: Annotated[float, Signal("A", "integral part of the pressure PID", 5.0)]
     pid_slope: Annotated[float, Signal("A", "derivative part of the pressure PID", 1.0)]
-    pid_last: Annotated[float, Signal("Pa", "last differentiated signal", 2e6)]
+    pid_last: Annotated[float, Signal("Pa", "previous value of the differentiated signal", 2e6)]
     pi_integral: Annotated[float, Signal("1", "integral part of the current PI", 0.3)]
     lp_s1: Annotated[float, Signal("A", "low-pass state 1", 1.0)]
     lp_s2: Annotated[float, Signal("A", "low-pass state 2", 5.0)]

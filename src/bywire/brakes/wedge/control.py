@@ -57,12 +57,16 @@ class Memory(NamedTuple):
     i_most: Annotated[float, Signal("A", "limit of both current demands", 20.0)]
     derated: Annotated[float, Signal("1", "motors derated")]
     adjusting: Annotated[float, Signal("1", "adjuster: 0 waits, 1 brake applied, 2 turns", 2.0)]
-    click_rate: Annotated[float, Signal("1/s", "teeth that the adjuster turns per second", 50.0)]
-    meant_rate: Annotated[float, Signal("1/s", "teeth commanded to the adjuster per second", 50.0)]
+    click_rate: Annotated[float, Signal("1/s", "adjuster speed, in teeth per second", 50.0)]
+    meant_rate: Annotated[
+        float, Signal("1/s", "commanded adjuster speed, in teeth per second", 50.0)
+    ]
     clicks: Annotated[float, Signal("1", "teeth turned by the adjuster", 3.0)]
     gap_hat: Annotated[float, Signal("m", "clearance estimated by the adjuster", 2e-4)]
-    applied: Annotated[float, Signal("1", "the brake was applied since it was last parked")]
-    wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
+    applied: Annotated[float, Signal("1", "brake has been applied since it was last parked")]
+    wide: Annotated[
+        float, Signal("1", "consecutive applications with too large a gap; < 0: too small")
+    ]
     teeth: Annotated[float, Signal("1", "teeth turned, as counted by the adjuster", 3.0)]
 
 

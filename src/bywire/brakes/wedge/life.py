@@ -149,7 +149,7 @@ WEDGE_PADS = Life(
         "clicks": Slow("1", "teeth turned"),
         "K_cal": Slow("N/m", "stiffness"),
         "counted": Slow("1", "teeth counted by the adjuster", is_drawn=False),
-        "wide": Slow("1", "applications in a row with too much clearance", is_drawn=False),
+        "wide": Slow("1", "consecutive applications with too much clearance", is_drawn=False),
         "work": Slow("J", "friction work", is_drawn=False),
     },
     limits={

@@ -317,7 +317,8 @@ _FORCE = Quantity("force", "N", 0.0)
 
 FORCE_FIGHT = _two_motor_loop(
     name="force-fight",
-    summary="position control of two motors on one reference, pushing on a force sensor, at 5 kHz",
+    summary="position control of two motors with a common reference, pushing on a force sensor, "
+    "at 5 kHz",
     at=_FORCE,
     point=force_point,
     causes=_DRIVE_TRAIN,

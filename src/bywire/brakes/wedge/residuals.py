@@ -108,7 +108,7 @@ RESIDUALS = (
     ),
     Residual(
         "effort",
-        "the larger of both motors' demands",
+        "the larger of the two motors' demands",
         NAME,
         "A",
         ("i_1_ref", "i_2_ref", "M_set"),

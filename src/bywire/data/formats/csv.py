@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import FileError, quoted
+from bywire.core.errors import FileError, counted, quoted
 from bywire.core.typing import Progress
 from bywire.data.file_format import Column, FileFormat, ReadOptions
 from bywire.data.text_dialect import (
@@ -163,16 +163,16 @@ def _require_width(path: Path, line: int, cells: list[str], dialect: Dialect) ->
         cells += [""] * (dialect.width - len(cells))
     if len(cells) != dialect.width:
         fix = (
-            "Complete the row. If blanks separate columns, use a mark such as nan for a missing "
+            "Complete the row. If spaces separate columns, use a mark such as nan for a missing "
             "value"
             if dialect.separator == " "
             else "Complete the row, or remove it if the recording was interrupted here. With "
             "decimal commas, separate the columns by semicolons"
         )
         raise FileError(
-            f"{path}, line {line}: {len(cells)} cells, but the first row has {dialect.width} "
-            f"(separated by {SEPARATORS[dialect.separator]}). {fix}. If other lines "
-            "precede the table, set skip_lines in the mapping to their number",
+            f"{path}, line {line}: {counted(len(cells), 'cell')}, but the first row has "
+            f"{dialect.width} (separated by {SEPARATORS[dialect.separator]}). {fix}. If other "
+            "lines precede the table, set skip_lines in the mapping to their number",
             name=str(path),
             value=str(len(cells)),
             valid=str(dialect.width),

@@ -35,7 +35,7 @@ _INCLUDED = re.compile(r'^#include "(.*)"$', re.MULTILINE)
 class SoftwareInTheLoop:
     """Engine for single runs whose tasks are the ECU's compiled C code.
 
-    Falsified signals and missed ticks apply outside the ECU.
+    Corrupted signals and missed ticks apply outside the ECU.
 
     Parameters
     ----------

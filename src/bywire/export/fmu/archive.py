@@ -341,10 +341,10 @@ _STEPS = {
 }
 _EXCHANGED = (
     "A client's solver integrates the states. Bodies with dry friction stick or slide, states "
-    "with limits are free or at a limit, and contacts are closed or open. These modes (mode.*) "
-    "change only in event mode, when an event indicator has changed sign or an input has changed. "
-    "The ECU's outputs are inputs of this FMU. Set them in event mode. This FMU omits energies and "
-    "other integrals."
+    "with limits are free or at a limit, stop operators follow their motion or slip, and contacts "
+    "are closed or open. These modes (mode.*) change only in event mode, when an event indicator "
+    "has changed sign or an input has changed. The ECU's outputs are inputs of this FMU. Set them "
+    "in event mode. This FMU omits energies and other integrals."
 )
 
 

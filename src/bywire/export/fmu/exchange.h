@@ -1,8 +1,9 @@
 /* A plant between the events of a client's solver: modes, derivatives, event indicators.
  *
  * A modal state has dry friction or a limit. Its mode is its direction of motion, 1 or -1, or 0 while
- * it is stuck. A stuck state and its derivative are zero. Contacts are closed or open. Modes change
- * only in event mode. Between events, all equations are smooth except for kinks in the plant's own
+ * it is stuck. A stuck state and its derivative are zero. A stop operator follows its motion in mode
+ * 0. In mode 1 or -1, it slips at its width. Contacts are closed or open. Modes change only in event
+ * mode. Between events, all equations are smooth except for kinks in the plant's own
  * laws.
  */
 #include <stdint.h>
@@ -12,10 +13,12 @@
 void bw_closing(const double *p, const double *x, double *closed);
 void bw_equations(const double *p, const double *x, const double *m, const double *closed,
     double *balance, double *mass, double *low, double *high, double *pressed, double *lack);
+void bw_widths(const double *p, const double *x, const double *m, const double *closed,
+    const double *rate, double *width, double *growth);
 void bw_output(const double *p, const double *x, const double *m, const double *closed,
     const double *reaction, double *row);
 
-#define INDICATORS (2 * MODAL + CONTACTS)
+#define INDICATORS (2 * MODAL + CONTACTS + STOPS)
 /* A value exactly on an edge is not beyond it, because a solver that stops there would otherwise find
  * no change. The edges of quantities with rounding errors have a width. For a velocity, the width is
  * a fraction of its usual magnitude: a solver's error when a body breaks away. For an overlap, which
@@ -25,14 +28,16 @@ void bw_output(const double *p, const double *x, const double *m, const double *
 #define CONTACT_EDGE 1e-14
 #define WRONG_STATES "wrong number of continuous states"
 
-static const int modal_states[] = MODAL_STATES;
+static const int modal_states[] = MODAL_STATES, stop_states[] = STOP_STATES;
 static const double nominals[] = NOMINALS;
 
 typedef struct {
   double p[PARAMETERS + 1], u[STIMULI + 1], state[STATE], row[ROWS + 1];
   double time, events; /* events: number of mode changes */
   double origin, stop; /* client's times of the run's beginning and of its latest end [s] */
-  double mode[MODAL + 1], closed[CONTACTS + 1], reaction[MODAL + 1];
+  double mode[MODAL + STOPS + 1], closed[CONTACTS + 1], reaction[MODAL + STOPS + 1];
+  double width[STOPS + 1], growth[STOPS + 1]; /* of the stop operators, and its derivative */
+  double speed[STOPS + 1];                    /* of their motions */
   double rate[STATES], indicator[INDICATORS + 1];
   int32_t is_set;   /* a value has been set since the derivatives were computed */
   int32_t is_stale; /* the rows are older than the derivatives */
@@ -46,7 +51,8 @@ static double *states(run *r) { return r->state + X_AT; }
 static inline double seconds(const run *r) { return r->time; }
 
 /* Derivatives and event indicators. A reaction balances the load on a stuck body. An indicator turns
- * negative if the load exceeds the reaction's bounds, a body reverses, or a contact changes. */
+ * negative if the load exceeds the reaction's bounds, a body reverses, a contact changes, or a stop
+ * operator reaches its width or ceases to slip. */
 static void evaluate(run *r) {
   double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
   double pressed[CONTACTS + 1], lack[CONTACTS + 1];
@@ -61,6 +67,17 @@ static void evaluate(run *r) {
     r->indicator[2 * k + 1] = mode == 0.0 ? fmin(high[k] + f, -low[k] - f) + EDGE : 1.0;
   }
   for (int k = 0; k < STATES; ++k) r->rate[k] = balance[k] / mass[k];
+  bw_widths(r->p, states(r), r->state + M_AT, r->closed, r->rate, r->width, r->growth);
+  for (int k = 0; k < STOPS; ++k) {
+    const int at = stop_states[k];
+    const double mode = r->mode[MODAL + k];
+    r->speed[k] = r->rate[at];
+    r->reaction[MODAL + k] = mode == 0.0 ? 0.0 : mode * r->growth[k] - r->speed[k];
+    r->rate[at] += r->reaction[MODAL + k];
+    r->indicator[2 * MODAL + CONTACTS + k] = mode == 0.0
+        ? r->width[k] - fabs(states(r)[at]) + MOTION_EDGE * nominals[at]
+        : mode * r->speed[k] - r->growth[k] + EDGE;
+  }
   for (int k = 0; k < CONTACTS; ++k)
     r->indicator[2 * MODAL + k] = CONTACT_EDGE + (r->closed[k] != 0.0 ? pressed[k] : -lack[k]);
   r->is_set = 0;
@@ -74,11 +91,29 @@ static void refresh(run *r) {
   r->is_stale = 0;
 }
 
+/* Set the modes of the stop operators, and the states that slip. Return 1 if a state was changed. */
+static int settle_stops(run *r) {
+  int is_new = 0;
+  r->is_set = 1;
+  evaluate(r);
+  for (int k = 0; k < STOPS; ++k) {
+    double *z = &states(r)[stop_states[k]], *mode = &r->mode[MODAL + k];
+    const double width = r->width[k], speed = r->speed[k], was = *z;
+    const double side = width > 0.0 ? (*z > 0.0) - (*z < 0.0) : (speed > 0.0) - (speed < 0.0);
+    if (*mode * speed - r->growth[k] < 0.0) *mode = 0.0;
+    if (*mode == 0.0 && fabs(*z) >= width && side * speed - r->growth[k] > 0.0) *mode = side;
+    if (*mode != 0.0) *z = *mode * width;
+    else if (fabs(*z) > width) *z = *z > 0.0 ? width : -width;
+    is_new |= *z != was;
+  }
+  return is_new;
+}
+
 /* Set the modes that follow from state and inputs. Return 1 if a state was set to zero or a rate may
  * jump, because some clients' solvers restart only if the FMU reports changed states. */
 static int settle(run *r) {
   double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
-  double pressed[CONTACTS + 1], lack[CONTACTS + 1], mode[MODAL + 1], closed[CONTACTS + 1];
+  double pressed[CONTACTS + 1], lack[CONTACTS + 1], mode[MODAL + STOPS + 1], closed[CONTACTS + 1];
   int is_new = r->is_set;
   memcpy(mode, r->mode, sizeof mode);
   memcpy(closed, r->closed, sizeof closed);
@@ -95,6 +130,7 @@ static int settle(run *r) {
     const double f = balance[modal_states[k]];
     if (r->mode[k] == 0.0) r->mode[k] = (f + low[k] > 0.0) - (f + high[k] < 0.0);
   }
+  is_new |= settle_stops(r);
   if (memcmp(mode, r->mode, sizeof mode) || memcmp(closed, r->closed, sizeof closed)) {
     r->events += 1.0;
     is_new = 1;
@@ -108,6 +144,7 @@ static void started(run *r) {
     const double x = states(r)[modal_states[k]];
     r->mode[k] = (x > 0.0) - (x < 0.0);
   }
+  for (int k = 0; k < STOPS; ++k) r->mode[MODAL + k] = 0.0;
   settle(r);
   r->events = 0.0;
   r->time = r->origin;

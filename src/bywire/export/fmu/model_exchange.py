@@ -57,14 +57,21 @@ class Continuous:
         set-valued forces, and factors of the derivatives, (nx,) each; bounds of the set-valued
         forces; each contact's force if only this contact were closed; and its overlap minus its
         elastic deflection.
+    stops
+        Stop operators.
+    widths
+        ``(x, m, p, closed, rate) -> (width, growth)``: widths of the stop operators, and their
+        derivatives for the given derivatives of the states.
     output
         ``(x, m, p, closed, reaction, flow) -> o``: recorded signals; ``flow``: integrals.
     """
 
     modal: tuple[str, ...]
     contacts: int
+    stops: tuple[str, ...]
     closing: Any
     equations: Any
+    widths: Any
     output: Any
 
 
@@ -85,7 +92,7 @@ def build_continuous(model: Model, par: ParameterSet) -> Continuous:
     overlap = gaps(model, symbolic, x, x)
     closed = SX.sym("closed", overlap.shape[0])
     modal = (*model.frictions, *model.limits)
-    reaction = SX.sym("reaction", len(modal))
+    reaction = SX.sym("reaction", len(modal) + len(model.stops))
     compliance = _compliance(model, symbolic)
     force = _forces(compliance, overlap, closed)
     state, memory = symbol_tuple(model.State, x), symbol_tuple(model.Memory, m)
@@ -103,6 +110,9 @@ def build_continuous(model: Model, par: ParameterSet) -> Continuous:
         column([compliance[k, k] * force[k] for k in range(overlap.shape[0])]),
         overlap - compliance @ force,
     ]
+    rate = SX.sym("rate", x.shape[0])
+    width = column(model.widths(state, state, memory, symbolic, pressed))
+    width = ca.fmax(width, 0) if model.stops else width
     flow = SX.sym("flow", len(model.Flow._fields))
     integrals = symbol_tuple(model.Flow, flow)
     shown = model.output(state, memory, symbolic, pressed, scalars(reaction), integrals)
@@ -111,8 +121,10 @@ def build_continuous(model: Model, par: ParameterSet) -> Continuous:
     return Continuous(
         modal,
         overlap.shape[0],
+        model.stops,
         _function("closing", [x, p], [presses]),
         _function("equations", [x, m, p, closed], equations),
+        _function("widths", [x, m, p, closed, rate], [width, ca.jtimes(width, x, rate)]),
         _function("output", [x, m, p, closed, reaction, flow], [column(shown)]),
     )
 
@@ -144,7 +156,7 @@ def _forces(C: Any, overlap: Any, closed: Any) -> Any:
 
 # --- Variables and C text
 
-LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction"}
+LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction", "v": "rate"}
 """arguments of the C functions by kind of leaf, without the integrals, which the FMU omits"""
 
 
@@ -171,7 +183,8 @@ class Equations:
             "x": n.x,
             "m": n.memory,
             "c": self.continuous.contacts,
-            "r": len(self.continuous.modal),
+            "r": len(self.continuous.modal) + len(self.continuous.stops),
+            "v": n.x,
             "q": n.flow,
         }
         leaves = [[self.graph.leaf(kind, k) for k in range(lengths[kind])] for kind in kinds]
@@ -188,6 +201,11 @@ class Equations:
         return self._added(self.continuous.equations, "xmpc")
 
     @cached_property
+    def widths(self) -> list[list[Node]]:
+        """Widths of the stop operators, and their derivatives."""
+        return self._added(self.continuous.widths, "xmpcv")
+
+    @cached_property
     def output(self) -> list[Node]:
         """Recorded signals."""
         return self._added(self.continuous.output, "xmpcrq")[0]
@@ -195,7 +213,7 @@ class Equations:
     @property
     def shown(self) -> list[int]:
         """Recorded signals that depend on state and inputs, without integrals and ECU signals."""
-        held = leaves_read(self.graph, chain(*self.equations))["m"]
+        held = leaves_read(self.graph, chain(*self.equations, *self.widths))["m"]
         reads = [leaves_read(self.graph, [node]) for node in self.output]
         return [k for k, each in enumerate(reads) if not each["q"] and each["m"] <= held]
 
@@ -204,11 +222,16 @@ class Equations:
         """Constants for the C functions that use the equations, by the name of their macro."""
         states = list(signals_of(self.made.run.model.State).values())
         names = self.made.run.model.State._fields
-        modal = [names.index(name) for name in self.continuous.modal]
+        modal, stops = (
+            [names.index(name) for name in listed]
+            for listed in (self.continuous.modal, self.continuous.stops)
+        )
         return {
             "MODAL": len(modal),
             "CONTACTS": self.continuous.contacts,
+            "STOPS": len(stops),
             "MODAL_STATES": braced(map(str, modal)),
+            "STOP_STATES": braced(map(str, stops)),
             "NOMINALS": braced(number(signal.nominal) for signal in states),
         }
 
@@ -230,6 +253,15 @@ class Equations:
                     {f"closed[{k}]": node for k, node in enumerate(self.closing)},
                 ),
                 self._function("bw_equations", f"{held}, {outputs}", results),
+                self._function(
+                    "bw_widths",
+                    f"{held}, const double *rate, double *width, double *growth",
+                    {
+                        f"{name}[{k}]": node
+                        for name, nodes in zip(("width", "growth"), self.widths, strict=True)
+                        for k, node in enumerate(nodes)
+                    },
+                ),
                 self._function(
                     "bw_output",
                     f"{held}, const double *reaction, double *row",
@@ -264,7 +296,7 @@ def exchange_interface(equations: Equations, start_reads: frozenset[int]) -> Int
         Indices of the parameters that the initial values depend on.
     """
     made, graph = equations.made, equations.graph
-    read = leaves_read(graph, [n for nodes in equations.equations for n in nodes])
+    read = leaves_read(graph, chain(*equations.equations, *equations.widths))
     shown = equations.shown
     names = _state_names(equations, shown)
     outputs = set(made.program.outputs)
@@ -319,6 +351,9 @@ def _modes(equations: Equations) -> Iterator[Variable]:
     for k in range(continuous.contacts):
         label = f"contact {k + 1}: 1 while closed"
         yield Variable(f"mode.contact_{k + 1}", "local", "closed", k, "1", label, is_held=True)
+    for k, name in enumerate(continuous.stops, len(continuous.modal)):
+        label = f"{known[name].label}: 0 follows its motion, otherwise the direction of its slip"
+        yield Variable(f"mode.{name}", "local", "mode", k, "1", label, is_held=True)
     label = "number of mode changes"
     yield Variable("mode.changes", "local", "events", 0, "1", label, is_held=True)
     at = 0
@@ -334,6 +369,9 @@ def _modes(equations: Equations) -> Iterator[Variable]:
     for k in range(continuous.contacts):
         label = "compression or gap"
         yield _indicator(at + k, f"contact_{k + 1}", Signal("1", f"contact {k + 1}"), label)
+    for k, name in enumerate(continuous.stops, at + continuous.contacts):
+        label = "distance to its width, or slip speed"
+        yield _indicator(k, f"{name}.slip", Signal("1", known[name].label), label)
 
 
 def _indicator(at: int, name: str, signal: Signal, meaning: str) -> Variable:

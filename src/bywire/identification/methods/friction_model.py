@@ -162,8 +162,8 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
     if short:
         each = ", ".join(f"{count} {way}" for way, count in counts.items())
         raise ParameterError(
-            f"too few samples slide {' and '.join(short)} ({each}). At least {_LEAST} samples in "
-            "each direction are needed. Record motion in both directions, or reduce "
+            f"too few samples show sliding {' and '.join(short)} ({each}). At least {_LEAST} "
+            "samples in each direction are needed. Record motion in both directions, or reduce "
             f"{option('options')} slowest, which "
             f"excludes samples below {100 * slowest:g} % of a record's maximum speed",
             name="slowest",
@@ -180,7 +180,7 @@ def _require_braking(sliding: Mapping[str, xr.Dataset]) -> None:
     along = float(F @ v / np.sqrt((F @ F) * (v @ v))) if F.any() else 0.0
     if along < 0.0:
         raise wrong_sign(
-            "friction", "speed", f"cosine {along:.2f}, but it must be > 0, as for passive friction"
+            "friction", "speed", f"the cosine is {along:.2f}, but must be > 0 for passive friction"
         )
 
 

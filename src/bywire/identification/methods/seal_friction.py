@@ -209,9 +209,11 @@ def _require_signs(A: float, friction: float) -> None:
         outward than inward.
     """
     if A < 0.0:
-        raise wrong_sign("F", "p", f"area {shown(float(f'{A:.4g}'), 'm**2')}, but it must be > 0")
+        raise wrong_sign(
+            "F", "p", f"the area is {shown(float(f'{A:.4g}'), 'm**2')}, but must be > 0"
+        )
     if friction < 0.0:
-        raise wrong_sign("F", "x", f"mean friction {friction:.3g} N, but it must be > 0 N")
+        raise wrong_sign("F", "x", f"the mean friction is {friction:.3g} N, but must be > 0 N")
 
 
 def _half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:
@@ -500,7 +502,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
         notes=(
             f"{sum(len(g.strokes) for g in groups)} strokes in {len(groups)} groups by record "
             "and direction",
-            "loop half widths neglect the pressure difference between the directions",
+            "loop half-widths neglect the pressure difference between the directions",
             *(f"{label} {reason}" for label, reason in fit.vague().items()),
             *_drifting(groups, fit["A"]),
             *_misfits(groups, W, F),

@@ -261,7 +261,7 @@ def _short_stroke() -> list[Item]:
             FACTS["sensor_range"],
             p_end / BAR,
             note="pressure at which the piston reaches the chamber's end with that stroke, within "
-            "the range. Not judged, because the stroke is only our trial",
+            "the range. Not judged, because we chose this stroke only for a test",
         ),
     ]
 

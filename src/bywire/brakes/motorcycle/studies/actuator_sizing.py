@@ -366,7 +366,7 @@ class Options(ParameterSet):
     bandwidth: Frequency
     """required bandwidth: frequency of the sine, or bandwidth of the step response"""
     p_peak: Pressure
-    """maximum pressure: crest of the sine or end of the step"""
+    """maximum pressure: peak of the sine or end of the step"""
     amplitude: Pressure
     """sine amplitude"""
     p_from: Pressure
@@ -615,7 +615,7 @@ def _warnings(kpis: list[Kpi], k_best: float, options: Options) -> tuple[str, ..
 STUDY = Study(
     name="actuator-sizing",
     assembly="motorcycle-brake",
-    summary="gear ratio and motor power for a bandwidth and a peak pressure, and their trial",
+    summary="gear ratio and motor power for a bandwidth and a peak pressure, and a simulation test",
     options=Options,
     defaults=Options(
         bandwidth=10.0,

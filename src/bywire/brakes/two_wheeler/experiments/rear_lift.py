@@ -37,7 +37,7 @@ class Options(ParameterSet):
     p_rate: PressureRate
     """front pressure build-up rate; if it is too high, the wheel locks before it is loaded"""
     grip: Factor
-    """factor on the road's adhesion; sport tires have more than the car tires in the data"""
+    """scale factor for the adhesion; sport tires have more grip than the car tires in the data"""
     duration: Duration
     """recording time"""
 

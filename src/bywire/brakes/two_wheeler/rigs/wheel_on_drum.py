@@ -62,7 +62,7 @@ class Memory(NamedTuple):
     slip_hat: Annotated[float, Signal("1", "measured slip", 0.1)]
     slip_ref: Annotated[float, Signal("1", "slip set point", 0.1, set_point_of="slip")]
     integral: Annotated[float, Signal("Pa", "integral part", 2e6)]
-    acts: Annotated[float, Signal("1", "slip control acts")]
+    acts: Annotated[float, Signal("1", "slip control is active")]
 
 
 class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):

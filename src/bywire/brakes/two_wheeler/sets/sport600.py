@@ -13,7 +13,7 @@ from bywire.plant.road import SURFACES
 from bywire.reproduction.source_file import SourceFile
 
 _DRY = {
-    name: derived(value, "dry asphalt for car tires, as circulated")
+    name: derived(value, "dry asphalt for car tires, commonly published values")
     for name, value in SURFACES["dry-asphalt"]._asdict().items()
 }
 
@@ -69,7 +69,9 @@ FRONT600 = CitedSet(
         "drum.v": chosen(20.0, "middle of a stop"),
         "drum.N": chosen(2200.0, "front wheel load during a full stop on wet asphalt"),
         **{
-            f"drum.surface.{name}": derived(value, "wet asphalt for car tires, as circulated")
+            f"drum.surface.{name}": derived(
+                value, "wet asphalt for car tires, commonly published values"
+            )
             for name, value in SURFACES["wet-asphalt"]._asdict().items()
         },
         "T_s": SPORT600.values["ecu.T_s"],

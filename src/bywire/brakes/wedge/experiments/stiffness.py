@@ -216,9 +216,9 @@ class ForceCycleOptions(ParameterSet):
     c_sensor: Length
     """maximum travel in each direction with the force sensor between the screws"""
     c_close: Length
-    """maximum travel toward each other in the brake heart, tip to tip"""
+    """maximum travel of the screws toward each other in the brake heart, tip to tip"""
     c_apart: Length
-    """maximum travel apart in the brake heart, through the wedge"""
+    """maximum travel of the screws away from each other in the brake heart, through the wedge"""
     omega_slow: AngularSpeed
     """speed of both motors"""
 

@@ -47,8 +47,10 @@ class Parameters(wear_adjuster.Parameters):
 class State(NamedTuple):
     """Memory of the adjuster."""
 
-    applied: Annotated[float, Signal("1", "the brake was applied since it was last parked")]
-    wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
+    applied: Annotated[float, Signal("1", "brake has been applied since it was last parked")]
+    wide: Annotated[
+        float, Signal("1", "consecutive applications with too large a gap; < 0: too small")
+    ]
     teeth: Annotated[float, Signal("1", "teeth turned, as counted by the adjuster", 3.0)]
 
 

@@ -52,7 +52,7 @@ class RigOptions(ParameterSet):
     margin: Duration
     """time to omit at the start and end of each motion"""
     window: Duration
-    """averaging time of the signals"""
+    """averaging time for the signals"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
     """current noise in synthetic measurements"""
     sigma_F: Annotated[float, Unit("N", 5.0), Field(ge=0)]
@@ -123,9 +123,9 @@ def cogging_meanings(stage: str) -> dict[str, tuple[str, str]]:
 LAW_MEANINGS: Mapping[str, tuple[str, str]] = {
     "offset": ("A", "current at zero force, i_0"),
     "force_per_current": ("N/A", "slope of the line, c"),
-    "half_width": ("A", "half width of the friction band at zero force, w_0"),
-    "half_width_slope": ("A/N", "growth of the half width with force, w_1"),
-    "half_width_curvature": ("A/N**2", "growth of the half width with force squared, w_2"),
+    "half_width": ("A", "half-width of the friction band at zero force, w_0"),
+    "half_width_slope": ("A/N", "growth of the half-width with force, w_1"),
+    "half_width_curvature": ("A/N**2", "growth of the half-width with force squared, w_2"),
 }
 """unknowns of the law -> SI unit and meaning"""
 
@@ -193,7 +193,7 @@ def squeeze(
     data
         ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N].
     par
-        Screw lead, cogging order, corner frequency of the force sensor, and the change of bearing
+        Screw lead, cogging order, cutoff frequency of the force sensor, and the change of bearing
         and motor friction with speed.
     options
         Filter and windows.
@@ -381,7 +381,7 @@ def identify(
         ),
         curves=(_curve(cycle, values),),
         notes=(
-            "half widths are valid at the mean speed of the test. At rest the force may be "
+            "half-widths are valid at the mean speed of the test. At rest the force may be "
             "anywhere within them",
             "the change of bearing friction with speed comes from the parameter set",
         ),

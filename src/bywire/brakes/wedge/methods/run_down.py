@@ -18,7 +18,7 @@ from bywire.brakes.wedge.case import turned
 from bywire.brakes.wedge.experiments import run_down
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, counted
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.typing import Array
@@ -72,8 +72,9 @@ def _read_run(label: str, data: xr.Dataset, par: WedgeParameters, options: Optio
     motion = motions(moved, "omega", options.slowest, options.margin, options.window)
     if len(motion.windows) < len(_NAMES):
         raise ParameterError(
-            f"record {label} has {len(motion.windows)} windows of {1e3 * options.window:g} ms "
-            f"above {options.slowest:g} rad/s, but the fit needs >= {len(_NAMES)}. {_ADVICE}",
+            f"record {label} has {counted(len(motion.windows), 'window')} of "
+            f"{1e3 * options.window:g} ms above {options.slowest:g} rad/s, but the fit needs >= "
+            f"{len(_NAMES)}. {_ADVICE}",
             name=f"record {label}",
             value=str(len(motion.windows)),
             valid=f">= {len(_NAMES)}",
@@ -153,7 +154,7 @@ class Options(ParameterSet):
     margin: Duration
     """time to omit at the start and end of each coasting phase"""
     window: Duration
-    """averaging time of the torque balance"""
+    """averaging time for the torque balance"""
     cutoff: Frequency
     """cutoff frequency of the low-pass filter for the angle before differentiation"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]

@@ -280,7 +280,7 @@ def identify(
         if label not in records:
             raise ParameterError(
                 f"the measurement has no record {label} (it has {_named(records)}). "
-                f"Specify one file for each record, sensor and heart. {_ADVICE}",
+                f"Specify one file for the record sensor and one for heart. {_ADVICE}",
                 name=f"record {label}",
                 value=_named(records),
             )

@@ -135,7 +135,7 @@ def _together(runs: Runs) -> list[Item]:
             "hold.together",
             FACTS["together"],
             above["scheduled"] / above["preload"],
-            note=f"500 Nm at mu_B = {_AWAY:g}: {above['scheduled']:.3g} W working together, "
-            f"{above['preload']:.3g} W with preload",
+            note=f"500 Nm at mu_B = {_AWAY:g}: {above['scheduled']:.3g} W if the motors work "
+            f"together, {above['preload']:.3g} W with preload",
         ),
     ]

@@ -30,7 +30,7 @@ def current_loop(runs: Runs) -> Part:
             FACTS["fast_current"],
             usual / position,
             note=f"{usual:.0f} Hz compared with {position:g} Hz of the high-bandwidth position "
-            "control; both are ours",
+            "control. We chose both",
         ),
         found(
             "current_loop.slowest",

@@ -11,7 +11,7 @@ from bywire.plant.road import SURFACES
 from bywire.reproduction.source_file import SourceFile
 
 _ADHESION = {
-    name: derived(value, "dry asphalt for car tires, as circulated")
+    name: derived(value, "dry asphalt for car tires, commonly published values")
     for name, value in SURFACES["dry-asphalt"]._asdict().items()
 }
 

@@ -1,0 +1,1 @@
+"""Physical elements that bywire does not include, one file each."""

@@ -1,0 +1,1 @@
+"""Parameter sets with the sources of their values."""

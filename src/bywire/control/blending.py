@@ -1,0 +1,89 @@
+"""Blending of a regenerating motor with a friction brake, sampled."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Unit
+from bywire.core.signals import Signal
+
+TorqueRate = Annotated[float, Unit("N*m/s", 5e3), Field(gt=0, allow_inf_nan=False)]
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-2), Gt(0)]
+Torque = Annotated[float, Signal("N*m", "braking torque", 300.0)]
+Demand = Annotated[float, Signal("N*m", "demanded braking torque", 300.0), Ge(0)]
+Acting = Annotated[float, Signal("1", "slip control acts", 0.5), Ge(0), Le(1)]
+
+
+class Parameters(ParameterSet):
+    """Motor first: the friction brake supplies what the motor does not.
+
+    ``law``: motor torque from which the friction demand follows. With ``"reported"``, it is the
+    torque that the motor reports over the bus. With ``"commanded"``, it is the command. With
+    ``"predicted"``, it is the motor's limit when the friction brake will have responded.
+    """
+
+    law: Literal["reported", "commanded", "predicted"]
+    """motor torque that the friction brake complements"""
+    rate: TorqueRate
+    """largest rate of the motor's command"""
+    t_off: Duration
+    """time in which the motor's command falls to zero while slip control acts"""
+
+
+class State(NamedTuple):
+    """Command of the motor."""
+
+    T_m: Torque
+
+
+class Input(NamedTuple):
+    """Demand, limits of the motor now and ahead, reported torque, and slip control."""
+
+    T_demand: Demand
+    limit: Annotated[float, Signal("N*m", "limit of the motor", 300.0), Ge(0)]
+    limit_ahead: Annotated[float, Signal("N*m", "predicted limit of the motor", 300.0), Ge(0)]
+    T_reported: Torque
+    slip: Acting
+
+
+class Output(NamedTuple):
+    """Demands on motor and friction brake."""
+
+    T_motor: Torque
+    T_friction: Torque
+
+
+def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
+    r"""Advance the law by one sample.
+
+    .. math:: T_m = \min(T_{demand}, T_{limit}), \quad T_f = \max(T_{demand} - T_{seen}, 0)
+
+    Notes
+    -----
+    While the motor fades at a rate s, the sum of both torques dips. With a friction brake of delay
+    :math:`T_d` and lag :math:`\tau_b`, a motor of lag :math:`\tau_m` and a report that is
+    :math:`T_d` old, the dip is :math:`s \Theta` for a slow fade, with
+    :math:`\Theta = \tau_b + 2 T_d` (law "reported") or :math:`\tau_b + T_d - \tau_m` (law
+    "commanded"). Law "predicted" removes most of it.
+
+    References
+    ----------
+    D. Kade et al., US patent 5,511,859, 1996: friction demand from the reported motor torque.
+    """
+    free = ops.clip(ops.fmin(u.T_demand, u.limit), x.T_m - T * par.rate, x.T_m + T * par.rate)
+    # Slip control takes the motor out, because it is slower to modulate than the friction brake.
+    out = ops.fmax(x.T_m - T / par.t_off * ops.fmax(u.limit, x.T_m), 0.0)
+    command = ops.where(u.slip > 0.5, out, free)
+    if par.law == "reported":
+        seen = u.T_reported
+    elif par.law == "commanded":
+        seen = command
+    else:
+        seen = ops.where(u.slip > 0.5, command, ops.fmin(u.T_demand, u.limit_ahead))
+    friction = ops.fmax(u.T_demand - seen, 0.0)
+    return State(T_m=command), Output(T_motor=command, T_friction=friction)

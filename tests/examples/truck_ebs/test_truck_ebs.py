@@ -1,0 +1,94 @@
+"""The pneumatic brake at a truck wheel, against closed forms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bywire
+from bywire.plant import air
+from systems.loading import loaded
+
+FOLDER = Path(__file__).parents[3] / "examples" / "truck_ebs"
+QUICK = {  # without the delays of valve, rod and pedal
+    "relay.tau": "0.01 ms",
+    "relay.overlap": "0",
+    "relay.p_full": "0.001 bar",
+    "ecu.T_bus": "0 s",
+    "ecu.T_s": "1 ms",
+    "rod.m": "1e-3 kg",
+    "rod.F_fr": "0 N",
+    "rod.d": "1 N*s/m",
+    "options.t_pedal": "0 s",
+    "options.p_brake": "8.5 bar",
+    "options.duration": "50 ms",
+    "simulation.record": "0.1 ms",
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def brake():
+    with loaded(FOLDER):
+        yield
+
+
+def test_a_chamber_fills_and_moves_as_its_closed_forms():
+    result = bywire.run("ebs-response", overrides=QUICK)
+    run, par = result.recording, result.bench.par
+    t, p, x = (run[name].values for name in ("time", "p", "x"))
+    p_a, p_s = par.gas.p_atm, par.p_s + par.gas.p_atm
+    flow = par.feed.C * par.gas.p_ref * p_s  # choked, over p_ref: volume times pressure per time
+    yields = par.chamber.F_s0 / par.chamber.A_table[0]
+    fill = par.chamber.V_0 * yields / flow
+    assert yields == pytest.approx(0.3e5)
+    assert fill == pytest.approx(4.3e-3, rel=0.01)
+    # The rod moves at nearly constant pressure until the pads touch.
+    gap = par.disc.gap * par.rod.i
+    p_end = (par.chamber.F_s0 + par.chamber.k_s * gap) / par.chamber.A_table[0]
+    volume = par.chamber.A_table[0] * gap
+    stroke = (volume * (p_end + p_a) + par.chamber.V_0 * (p_end - yields)) / flow
+    touched = float(np.interp(gap, x, t))
+    assert touched == pytest.approx(fill + stroke, abs=0.3e-3)
+    assert touched == pytest.approx(11.35e-3, rel=0.05)
+    assert float(np.interp(yields, p, t)) == pytest.approx(4.35e-3, abs=0.3e-3)
+
+
+def test_exergy_and_mass_of_the_air_are_balanced():
+    result = bywire.run("ebs-response")
+    run, par = result.recording, result.bench.par
+    E = {name: float(run[name][-1]) for name in run if str(name).startswith("E_")}
+    sinks = ("E_feed", "E_outlet", "E_exhaust", "E_rod", "E_friction", "E_pads", "E_stop")
+    stored = float(run["E_stored"][-1] - run["E_stored"][0])
+    pressed = par.chamber.F_s0**2 / (2.0 * par.stop.k_stop)  # energy of the stop at the start
+    out = sum(E[name] for name in sinks) + stored + pressed
+    assert out == pytest.approx(E["E_source"], rel=1e-8)
+    assert E["E_feed"] > 0.3 * E["E_source"]
+
+
+def test_the_response_meets_its_times():
+    result = bywire.run(FOLDER / "benches" / "response.toml")
+    assert result.status == "passed"
+
+
+def test_air_that_warms_fills_faster_and_sags():
+    isothermal = bywire.run("ebs-response").recording
+    heat = bywire.run("ebs-response", overrides={"volume.law": "heat"}).recording
+    assert float(heat["T"].max()) > 330.0
+    assert float(heat["T"][-1]) < 310.0
+    assert heat["F_cl"].max() > 0.9 * isothermal["F_cl"].max()
+
+
+def test_the_kinetic_energy_goes_to_brake_and_tire():
+    result = bywire.run("ebs-stop")
+    run, par = result.recording, result.bench.par
+    v = 80.0 / 3.6
+    kinetic = 0.5 * par.corner.body.m * v**2 + 0.5 * par.wheel.J * (v / par.wheel.r) ** 2
+    assert float(run["E_brake"][-1] + run["E_tyre"][-1]) == pytest.approx(kinetic, rel=1e-4)
+    assert float(run["omega"][-1]) == 0.0
+    assert air.gas_constant(par.gas) == pytest.approx(287.87, rel=1e-4)
+
+
+def test_every_contract_holds():
+    assert bywire.check("truck-ebs").holds
