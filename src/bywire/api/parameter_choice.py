@@ -28,8 +28,8 @@ def set_for(subject: str, assemblies: tuple[str, ...], name: str) -> CitedSet:
     cited = PARAMETER_SETS.find(name or main_set(assemblies[0]))
     if cited.assembly not in assemblies:
         raise ParameterError(
-            f"{subject} needs parameters of a {' or '.join(assemblies)}, but parameter set {cited.name!r} belongs "
-            f"to a {cited.assembly}. Choose another parameter set",
+            f"{subject} needs parameters of a {' or '.join(assemblies)}, but parameter set "
+            f"{cited.name!r} belongs to a {cited.assembly}. Choose another parameter set",
             name="parameters",
             value=cited.name,
             valid=" or ".join(assemblies),
