@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections.abc import Callable
@@ -272,3 +273,47 @@ def test_an_experiment_tests_only_its_variants(caliper: Path) -> None:
         toolkit.Bench("clamp-step", "strathmann2015")
     with pytest.raises(ParameterError, match="needs parameters of a emb-caliper, but"):
         toolkit.margins("motor-current", parameters=SYNCHRONOUS)
+
+
+def test_field_weakening_reaches_the_speed_limit_at_a_low_voltage(caliper: Path) -> None:
+    """The back EMF reaches the usable voltage of 24 V at 298 rad/s."""
+    figures = []
+    for k_fw in (0.0, 300.0):
+        changes = {"supply.V_bat": "24 V", "ecu.current.k_fw": k_fw}
+        result = toolkit.run(toolkit.Bench("clamp-step", SYNCHRONOUS, changes, STEP))
+        figures.append({each.name: each.value for each in result.kpis})
+    plain, weakened = figures
+    assert plain["speed_max"] < 270.0
+    assert weakened["speed_max"] > 295.0
+    assert weakened["rise_time"] < 0.9 * plain["rise_time"]
+
+
+def test_the_compiled_ecu_drives_the_same_run(caliper: Path) -> None:
+    python, compiled = (
+        toolkit.run(
+            toolkit.Bench("clamp-step", SYNCHRONOUS, options=STEP, engine=engine)
+        ).recordings["run"]
+        for engine in ("auto", "sil")
+    )
+    for name in ("F_cl", "i_d", "i_q", "omega"):
+        np.testing.assert_allclose(compiled[name], python[name], rtol=0.0, atol=1e-9)
+
+
+def test_a_campaign_injects_the_faults_of_the_new_elements(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "clamp.toml").write_text(
+        f'experiment = "clamp-step"\nparameters = "{SYNCHRONOUS}"\n[options]\nduration = "0.3 s"\n'
+    )
+    campaign = tmp_path / "campaign.toml"
+    campaign.write_text(
+        'bench = "clamp.toml"\n[campaign]\nonly = ["motor.*", "encoder.*", "inverter.*"]\n'
+        'healthy = 4\nonset = "0.15 s"\n[[criteria]]\nname = "loss"\nsignal = "F_cl"\n'
+        'below_share = "80 %"\nlasting = "20 ms"\n'
+    )
+    code, out, err = command("faults", campaign, "--json")
+    assert code == 0, err
+    assert {each["fault"] for each in json.loads(out)["faults"]} == {
+        "motor.hot",
+        "motor.demagnetized",
+        "encoder.turned",
+        "inverter.slow-driver",
+    }
