@@ -47,7 +47,7 @@ def test_errors_of_temperatures_are_differences():
 
 def test_a_run_of_the_cited_set_says_that_nothing_was_changed():
     result = bywire.run("seal-stribeck", estimate_error=False)
-    (said,) = [block.text for block in result.document().page[0].blocks]
+    said, _ = [block.text for block in result.document().page[0].blocks]
     assert said.startswith("Nothing was changed: all parameters are those of dardanelli2010")
 
 
@@ -70,7 +70,7 @@ def test_a_run_without_requirements_counts_the_undefined_key_figures():
 def test_report_and_terminal_state_the_origins_of_the_parameters(tmp_path: Path) -> None:
     result = bywire.run("hard-braking", estimate_error=False)
     text = (
-        "38 printed in a source, 3 derived from printed ones, 6 calibrated to match a source, 88 "
+        "38 printed in a source, 3 derived from other values, 6 calibrated to match a source, 88 "
     )
     assert f"values of dardanelli2010: {text}" in str(result)
     result.write(tmp_path)

@@ -35,7 +35,9 @@ def test_a_bench_says_its_own_options():
 def test_reports_of_runs_and_studies_say_it_below_their_titles(tmp_path):
     quick = {"options.duration": "40 ms", "options.settle": "10 ms", "options.p_to": "30 bar"}
     run = bywire.run("hard-braking", quick, estimate_error=False)
-    assert run.document().summary.startswith("pressure step from 6 bar to 30 bar")
+    assert run.document().summary.startswith(
+        "simulation of motorcycle-brake: pressure step from 6 bar to 30 bar"
+    )
     lines = "\n".join(f'{name} = "{value}"' for name, value in quick.items())
     text = f'bench = "hard-braking"\n[set]\n{lines}\n[vary]\n"options.p_from" = "+-5 %"\n'
     (tmp_path / "study.toml").write_text(text)

@@ -399,8 +399,8 @@ def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):
     assert {k: counts for k, counts in harmed.items() if counts} == {0: {"loss": 2}, 4: {"loss": 1}}
     assert [each.is_relieved for each in faults] == [False] * 5 + [True]
     assert found.harm_of_reaction() == (
-        "the reaction, bridge.open-phase, is harmful: it alone causes loss in 1 of 2 "
-        "harmless, seen faults; loss in 1 of 3 dangerous faults",
+        "the reaction, bridge.open-phase, is harmful: it alone causes loss in 2 of 6 faults "
+        "(1 of 2 harmless, seen; 1 of 3 dangerous)",
         "the reaction, bridge.open-phase, hastens loss in 1 of 3 dangerous faults",
     )
     assert found.benefit_of_reaction() == (

@@ -151,7 +151,7 @@ def test_what_was_put_in_stands_beside_the_start(bywire: Bywire) -> None:
         assert 0.0 < abs(found["start"][name] / truth[name] - 1.0) < 0.31
         low, high = estimate["interval_95"]
         assert abs(estimate["value"] - truth[name]) < high - low
-    assert " put in " in bywire(*arguments).out
+    assert "true value" in bywire(*arguments).out
 
 
 def test_a_failed_check_is_status_1(bywire: Bywire) -> None:

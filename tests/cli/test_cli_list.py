@@ -50,6 +50,13 @@ def test_a_method_says_all_that_its_use_takes(bywire: Bywire, name: str) -> None
         assert row["name"] in text
 
 
+def test_a_key_figure_says_how_it_is_computed(bywire: Bywire) -> None:
+    text = " ".join(bywire("list", "ripple").out.split())
+    assert "The default window is the last 20 % of the time after the step." in text
+    assert "math" not in bywire("list", "loop_area").out
+    assert "unit: -" in bywire("list", "share_stuck").out
+
+
 def test_what_is_found_under_a_name_of_several_kinds(bywire: Bywire) -> None:
     found = bywire("list", "friction-ramp", "--json")
     assert [one["kind"] for one in found.object["found"]] == ["experiment", "method"]

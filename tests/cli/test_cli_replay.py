@@ -134,6 +134,16 @@ def test_a_pedal_record_is_replayed_by_what_each_message_says_to_type(
     assert [note for note in outcome.object["notes"] if "cp1252" in note]
 
 
+def test_of_two_columns_that_may_drive_the_first_is_suggested(
+    bywire: Bywire, tmp_path: Path
+) -> None:
+    rows = [f"{1e-3 * k:.3f},{6 + 0.1 * k:.2f},{6 + 0.09 * k:.2f}" for k in range(40)]
+    path = tmp_path / "rig.csv"
+    path.write_text("\n".join(["t [s],Soll [bar],Haupt [bar]", *rows, ""]))
+    outcome = bywire("replay", path, "--bench", "hard-braking")
+    refused(outcome, "Type for example --input p_set=Soll. Haupt would also fit. ")
+
+
 def test_an_unknown_output_names_those_of_its_unit_first_and_the_whole_list(
     bywire: Bywire, tmp_path: Path
 ) -> None:

@@ -169,7 +169,7 @@ def test_the_same_measurement_in_every_layout(tmp_path, layout):
     [
         (
             "# rig\n" + HEADER + rows(),
-            "1 line before the table, from line 1 .'# rig'",
+            "line 1 .'# rig'. before the table",
         ),
         (
             "t [s],10\n" + rows(),

@@ -295,3 +295,18 @@ def test_a_replay_whose_energy_balance_is_open_says_so(ramp: xr.Dataset) -> None
     )
     replayed = replay(bench, ramp[["i", "p_mc"]], {"i_set": "i"})
     assert any("energy balance is off" in note for note in replayed.notes)
+
+
+def test_differences_of_temperatures_have_no_offset():
+    t = np.linspace(0.0, 1.0, 11)
+    pair = xr.Dataset(
+        {
+            "measured": ("time", np.full(t.size, 293.15), {"units": "K"}),
+            "modeled": ("time", np.full(t.size, 295.15), {"units": "K"}),
+        },
+        coords={"time": t},
+    )
+    found = {k.name: k for k in fit_figures(pair, Segment("all", 0.0, 1.0))}
+    for name in ("rmse", "max_error", "bias"):
+        assert (found[name].value, found[name].unit) == (pytest.approx(2.0), "delta_degC")
+    assert math.isnan(found["vaf"].value)

@@ -173,7 +173,7 @@ def test_widths_of_a_temperature_are_differences():
 def test_a_temperature_has_no_shares(entry):
     """5 % of 20 degC would be 15 K."""
     leaf = Leaf("motor_heat.T_a", Unit("K"), 200.0, 400.0, False, False)
-    with pytest.raises(InputError, match="different zeros"):
+    with pytest.raises(InputError, match="different zero points"):
         read_distribution("motor_heat.T_a", entry, leaf, 293.15)
     law = read_distribution("motor_heat.T_a", "+-10 K", leaf, 293.15)
     assert (law.low, law.high) == pytest.approx((283.15, 303.15))

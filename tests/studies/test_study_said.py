@@ -120,7 +120,7 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
 def test_no_more_points_are_left_out_than_are_said(found):
     values = np.linspace(0.05, 0.07, 9000)
     said = captions(found("rise_time", values, "<= 69.5 ms with 90 %"))["scatter-rise_time"]
-    assert "shows 4000 of 8775 cases that meet the limit and all that miss it (225)." in said
+    assert "shows 4000 of 8775 cases that meet the limit and all 225 cases that miss it." in said
 
 
 def test_a_surrogate_has_the_unit_of_its_figure(found):

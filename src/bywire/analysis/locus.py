@@ -128,7 +128,7 @@ def locus_of(
     """
     if len(values) < 2:
         raise ParameterError(
-            f"a locus over {name} needs at least two values, but it has {len(values)}",
+            f"a root locus for {name} needs at least two values, but it has {len(values)}",
             name=name,
             value=str(len(values)),
             valid=">= 2 values",

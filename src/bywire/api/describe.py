@@ -131,7 +131,10 @@ def _groups(cls: type[ParameterSet], prefix: str = "") -> Iterator[Mention]:
 
 # --- All about a name
 
-_LINES = ("parts", "assembly", "system", "at", "unit", "range", "experiment", "records", "source")
+_LINES = (
+    *("details", "parts", "assembly", "system", "at", "unit", "range", "experiment", "records"),
+    "source",
+)
 """keys of an object that are shown as lines, before the keys of an assembly"""
 _LONGEST = 200  # characters of a search
 _TABLES = ("drives", "signals", "found in", "values", "estimates", "kpis")
@@ -226,7 +229,7 @@ def _blocks(thing: Object) -> list[str | Flat]:
     there = [kind.topic.replace("_", " ") for kind in thing_kinds() if kind.has_assembly]
     lines = [f"{thing['kind']} {thing['name']}: {thing['summary']}"]
     lines += [
-        f"  {key}: {unit_text(thing[key]) if key == 'unit' else thing[key]}"
+        f"  {key}: {(unit_text(thing[key]) or '-') if key == 'unit' else thing[key]}"
         for key in (*_LINES, *there)
         if thing.get(key)
     ]

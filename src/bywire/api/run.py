@@ -110,6 +110,7 @@ _SAID = (
 
 # --- The result
 
+_NAMED = 3  # requirements that are not met, in the banner
 _SCATTERED = (
     'Errors marked "up to" belong to figures that do not converge. Between runs with twice, '
     "once and half the step size, their differences do not shrink as a second-order scheme "
@@ -222,7 +223,7 @@ class BenchResult(Result, Answer):
         notes += [Listing(said)] if said else []
         return Document(
             bench.name or bench.experiment,
-            f"{bench.summary()}; parameter set {bench.parameters}",
+            f"simulation of {bench.system}: {bench.summary()}; parameter set {bench.parameters}",
             sections=lambda: [
                 outcome(self, self.rows, notes),
                 Section("Figures", [*self._figures(), *source_says(self)]),
@@ -311,6 +312,9 @@ class BenchResult(Result, Answer):
         text = f"{met} of {len(self.verdicts)} requirements met"
         if open_ := sum(not v.is_decided for v in self.verdicts):
             text += f", {open_} undecided"
+        if names := list(dict.fromkeys(v.kpi for v in self.verdicts if not v.met)):
+            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+            text += f"; not met: {', '.join(names[:_NAMED])}{more}"
         return Banner(text, "good" if self.status == "passed" else "bad")
 
     def _data(self) -> dict[str, Any]:
@@ -376,14 +380,14 @@ def _remark(verdict: Verdict) -> str:
     if not verdict.is_decided and math.isfinite(verdict.error):
         return (
             f"requirement undecided: {verdict.kpi} is {measured_amount(value, unit, error)}, "
-            f"numerical error {error_text(value, unit, error)}{limit}. Use a smaller step"
+            f"with a numerical error of {error_text(value, unit, error)}{limit}. Use a smaller step"
         )
     if not verdict.is_decided and not math.isinf(verdict.error):
         return f"requirement undecided: {verdict.kpi} is not defined{limit} ({verdict.note})"
     if not verdict.is_decided:
         return (
-            f"requirement undecided: {verdict.kpi} is defined for only one of the step and half "
-            f"the step{limit}. Use a smaller step"
+            f"requirement undecided: {verdict.kpi} is defined with only one of the two step "
+            f"sizes{limit}. Use a smaller step"
         )
     return f"requirement not met: {verdict.kpi} is {amount(value, unit)}{limit}" + (
         f" ({verdict.note})" if verdict.note else ""

@@ -110,6 +110,11 @@ _SHORT = ("fault", "class", "severity", "violates", "within", "seen within", "wi
 """columns of a terminal"""
 _RANK = ("undetected", "too late", "covered", "latent", "harmless, seen")
 """classes of faults, the most dangerous first"""
+_MEANING = (
+    "Undetected, too late and covered faults violate a criterion (8/8: in 8 of 8 runs). Covered "
+    "faults are detected in time in every such run. Latent faults are harmless in this maneuver, "
+    "but not always detected."
+)
 _MOST = 12
 _NOTHING = 1e-4  # fraction of the maximum deviation below which a table shows no number
 
@@ -188,10 +193,14 @@ class FaultCampaign(Answer):
         known = Listing([kinds, *varied_texts(plan.varied), *self.notes])
         return Document(
             f"Faults: {plan.name}",
-            f"{len(plan.faults)} faults, {plan.total} runs of {subject.line}",
+            f"{len(plan.faults)} faults, {plan.total} simulated runs of {subject.line}",
             sections=lambda: [
                 Section(
-                    "Faults", [Paragraph(f"{first}. The most dangerous are listed first."), table]
+                    "Faults",
+                    [
+                        Paragraph(f"{first}. The most dangerous are listed first. {_MEANING}"),
+                        table,
+                    ],
                 ),
                 Section("Notes", [known]),
                 Section("Figures", self._figures()),

@@ -19,7 +19,13 @@ from bywire.core.units import difference_unit
 from bywire.report.document import Block, Details, Listing, Paragraph, Section, TableBlock
 from bywire.report.schematic import schematic_blocks
 from bywire.report.stated_levels import stated_level
-from bywire.report.subject import Subject, bench_changes, parameter_rows, source_block
+from bywire.report.subject import (
+    Subject,
+    bench_changes,
+    origins_block,
+    parameter_rows,
+    source_block,
+)
 from bywire.report.tables import (
     Cell,
     KpiRow,
@@ -131,7 +137,8 @@ def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> S
     blocks: list[Block] = []
     if judged := [row for row in rows if row.limit]:
         blocks.append(TableBlock(kpi_table(judged), "Requirements"))
-    return Section("Outcome", [*blocks, Subject.of_bench(result.bench).changes_block, *notes])
+    changed = Subject.of_bench(result.bench).changes_block
+    return Section("Outcome", [*blocks, changed, *notes, origins_block(result.bench.parameters)])
 
 
 def _options_in_use(bench: Bench) -> Details:

@@ -623,9 +623,17 @@ def _kpi(kpi: Any) -> Object:
     units = sorted({readable_units(kpis[kpi.name]) for kpis in experiments.values()})
     return {
         "summary": kpi.definition,
+        **({"details": details} if (details := _details(kpi)) else {}),
         "unit": " or ".join(units),
         "experiments": ", ".join(experiments),
     }
+
+
+def _details(kpi: Any) -> str:
+    """Return how a key figure is computed, on one line, without formulas."""
+    _, *rest = inspect.cleandoc(kpi.__doc__ or "").split("\n\n")
+    told = [" ".join(part.split()) for part in rest if not part.startswith((".. ", " "))]
+    return " ".join(told).replace("`", "")
 
 
 # --- Loops, plants and elements

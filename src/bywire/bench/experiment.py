@@ -22,7 +22,7 @@ from bywire.core.errors import ModelError, StepError, not_valid, quoted
 from bywire.core.machine import machine_memory as _memory
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.quantities import display_unit
+from bywire.core.quantities import BY_SIZE, display_unit
 from bywire.core.registry import Kind, instances
 from bywire.core.units import convert, unit_text
 from bywire.simulation.advance import Change
@@ -137,6 +137,9 @@ def _value_text(value: Any, symbol: str, unit: str) -> str:
     if isinstance(value, str):
         return value.replace("-", " ")
     several = value if isinstance(value, tuple) else (value,)
+    largest = max(abs(float(each)) for each in several)
+    if not unit and 0.0 < convert(largest, symbol, display_unit(symbol)) < 1e-3:
+        unit = BY_SIZE.get(symbol, ((0.0, ""),))[0][1]  # 1 Pa, not 1e-05 bar
     unit = unit or display_unit(symbol)
     ends = dict.fromkeys((min(several), max(several)))  # 2 to 100 Hz
     numbers = " to ".join(f"{convert(float(each), symbol, unit):.6g}" for each in ends)

@@ -273,13 +273,25 @@ def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> Faul
 
 
 def _harm(groups: Mapping[str, Sequence[Mapping[str, int]]]) -> list[str]:
-    """Return the affected criteria and the number of affected faults in each group."""
-    return [
-        f"{', '.join(dict.fromkeys(name for counts in worse for name in counts))} in {len(worse)} "
-        f"of {len(each)} {kind} faults"
+    """Return the affected criteria and the number of affected faults in each group.
+
+    If several groups are affected by the same criteria, their sum comes first.
+    """
+    affected = {
+        kind: worse
         for kind, each in groups.items()
         if (worse := [counts for counts in each if counts])
-    ]
+    }
+    criteria = {
+        kind: ", ".join(dict.fromkeys(name for counts in worse for name in counts))
+        for kind, worse in affected.items()
+    }
+    shares = {kind: f"{len(each)} of {len(groups[kind])} {kind}" for kind, each in affected.items()}
+    if len(shares) > 1 and len(set(criteria.values())) == 1:
+        count, total = sum(map(len, affected.values())), sum(map(len, groups.values()))
+        same = next(iter(criteria.values()))
+        return [f"{same} in {count} of {total} faults ({'; '.join(shares.values())})"]
+    return [f"{criteria[kind]} in {text} faults" for kind, text in shares.items()]
 
 
 def _numbers(values: Any) -> Array:

@@ -40,7 +40,7 @@ class Parameters(ParameterSet):
     slip_back: Fraction
     """slip below which a wheel has recovered"""
     t_lead: TimeConstant
-    """prediction time of the slip"""
+    """prediction horizon for the slip"""
     a_hold: Annotated[float, Unit("m/s**2", 10.0), Field(ge=0, allow_inf_nan=False)]
     """wheel recovery rate, relative to constant slip, below which pressure is reduced further"""
     t_hold: Duration

@@ -34,9 +34,9 @@ class Parameters(ParameterSet):
     T_t: Duration
     """tracking time of the anti-windup"""
     eager: Gain
-    """factor for additional integral gain at zero slip, which decreases to zero at the set slip"""
+    """factor for additional integral gain at zero slip, which decreases to zero at the set point"""
     v_off: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
-    """minimum reference speed of slip; below it, control fades out and the wheel may lock"""
+    """minimum reference speed for slip; below it, control fades out and the wheel may lock"""
     v_fall: Annotated[float, Unit("m/s", 5.0), Field(gt=0, allow_inf_nan=False)]
     """speed below which the slip set point decreases with speed, because sensors lag"""
     v_fixed: Annotated[float, Unit("m/s", 15.0), Field(gt=0, allow_inf_nan=False)]

@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
     """
 
     law: Literal["period", "difference"]
-    """method of computing the speed"""
+    """method for computing the speed"""
     pulses: Annotated[float, Unit("1", 48.0), Field(ge=1, allow_inf_nan=False)]
     """pulses per revolution"""
 

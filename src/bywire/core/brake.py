@@ -349,7 +349,7 @@ def error_with_line(error: BaseException, *inside: str) -> str:
         text = _of_pydantic(error)
     if "truth value of a CasADi" in text:
         text = (
-            "if, and, or, min and max do not work with a number of the model. Use "
+            "if, and, or, min and max do not work with the model's numbers. Use "
             "bywire.core.ops.where"
         )
     line = _innermost(error, *inside)

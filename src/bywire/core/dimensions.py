@@ -150,7 +150,7 @@ class Condition:
 
     def __bool__(self) -> bool:
         raise DimensionError(
-            "if does not work with a value. Use core.ops.where", valid="core.ops.where"
+            "if does not work with the model's numbers. Use core.ops.where", valid="core.ops.where"
         )
 
     def _bywire_op(self, name: str, *args: Any) -> Any:

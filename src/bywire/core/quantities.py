@@ -42,6 +42,8 @@ DISPLAY_UNITS = {
     "N/Pa": "N/bar",
     "K": "degC",
     "delta_degC": "K",
+    "delta_degC/s": "K/s",
+    "Pa/s": "bar/s",
 }
 
 

@@ -212,12 +212,13 @@ def unit_text(symbol: str) -> str:
 
     Examples
     --------
-    >>> unit_text("N*m"), unit_text("m**3/s"), unit_text("1")
-    ('N·m', 'm³/s', '')
+    >>> unit_text("N*m"), unit_text("m**3/s"), unit_text("1"), unit_text("delta_degC")
+    ('N·m', 'm³/s', '', 'K')
     """
     if symbol == "1":
         return ""
     raised = re.sub(r"\*\*(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPTS), clean(symbol))
+    raised = raised.replace("delta_degC", "K")  # a temperature difference
     dotted = re.sub(r"\s*\*\s*", "·", raised)
     return re.sub(r"[A-Za-z]+", lambda m: _SIGNS.get(m[0], m[0]), dotted)
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from bywire.core.errors import FileError, UnitError, counted, quoted
+from bywire.core.errors import FileError, UnitError, quoted
 from bywire.data.column_units import split_title, unit_of
 from bywire.data.file_format import ReadOptions
 from bywire.data.text_encoding import head_text
@@ -233,10 +233,13 @@ def dialect_of(head: Head) -> Dialect:
         )
     before = [k for k in range(at, begin) if not head.is_blank(k)]
     if before:
-        note = (
-            f"bywire skips {counted(len(before), 'line')} before the table, from line "
-            f"{before[0] + 1} ({quoted(head.plain(before[0]).strip())}) to {before[-1] + 1}"
-        )
+        first_line = f"line {before[0] + 1} ({quoted(head.plain(before[0]).strip())})"
+        note = f"bywire skips {first_line} before the table"
+        if len(before) > 1:
+            note = (
+                f"bywire skips {len(before)} lines before the table, from {first_line} "
+                f"to {before[-1] + 1}"
+            )
         dialect = replace(dialect, notes=(note, *dialect.notes))
     return dialect
 

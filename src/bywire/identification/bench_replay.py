@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 
 import numpy as np
 import xarray as xr
@@ -91,12 +92,18 @@ def _compared_outputs(
 def _pairs(
     data: xr.Dataset, measured: Sequence[str], signals: Mapping[str, Signal]
 ) -> list[tuple[str, str]]:
-    """Return signals of the model with measured ones of the same quantity, the likeliest first."""
+    """Return signals of the model with measured ones of the same quantity, the likeliest first.
+
+    Without a similar name, such as for a title in another language, the order is the model's.
+    """
     pairs = []
     for name in measured:
         unit = unit_of_symbol(str(data[name].attrs.get("units", "1")))
         alike = [model for model, signal in signals.items() if measures(unit, signal.unit)]
-        pairs += [(model, name) for model in by_likeness(alike, [name])]
+        likely = by_likeness(alike, [name])
+        if likely and not get_close_matches(name.casefold(), [likely[0].casefold()]):
+            likely = alike
+        pairs += [(model, name) for model in likely]
     return pairs
 
 
@@ -107,12 +114,17 @@ def _advice(argument: str, pairs: Sequence[tuple[str, str]]) -> str:
         fitting.setdefault(column, []).append(model)
     if not fitting:
         return ""
-    typed = {models[0]: column for column, models in fitting.items()}
-    several = {column: models for column, models in fitting.items() if len(models) > 1}
+    typed: dict[str, str] = {}
+    for column, models in fitting.items():
+        typed.setdefault(models[0], column)
     others = "".join(
-        f". {column} may also be {', '.join(models[1:][:_SHOWN])}"
-        for column, models in list(several.items())[:1]
+        f". {column} may also be {', '.join(models[1:][: _SHOWN + 1])}"
+        for column, models in fitting.items()
+        if len(models) > 1 and column in list(typed.values())[:_SHOWN]
     )
+    rest = [column for column, models in fitting.items() if typed[models[0]] != column]
+    if rest:
+        others += f". {', '.join(rest[:_SHOWN])} would also fit"
     return f"For example, type {option(argument, dict(list(typed.items())[:_SHOWN]))}{others}. "
 
 

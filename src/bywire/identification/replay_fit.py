@@ -509,12 +509,13 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     error = m - y
     whole = pair["measured"].values[np.isfinite(pair["measured"].values)]
     span, unit = float(np.ptp(whole)), str(pair["measured"].attrs.get("units", "1"))
+    off = units.difference_unit(unit)
     rmse = float(np.sqrt(np.mean(error**2)))
-    variance = float(np.var(y))
+    variance = float(np.var(y)) if np.ptp(y) else 0.0  # not the rounding errors
     lag, lag_note = _lag(part, there)
     still = "the measured signal does not move"
     return (
-        Kpi("rmse", rmse, unit, "Root mean square of modeled minus measured."),
+        Kpi("rmse", rmse, off, "Root mean square of modeled minus measured."),
         Kpi(
             "nrmse",
             100.0 * rmse / span if span else math.nan,
@@ -529,8 +530,8 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
             "Variance accounted for: 1 minus the ratio of error variance to measured variance.",
             "" if variance else still,
         ),
-        Kpi("max_error", float(np.abs(error).max()), unit, "Maximum magnitude of the error."),
-        Kpi("bias", float(error.mean()), unit, "Mean of modeled minus measured."),
+        Kpi("max_error", float(np.abs(error).max()), off, "Maximum magnitude of the error."),
+        Kpi("bias", float(error.mean()), off, "Mean of modeled minus measured."),
         Kpi(
             "lag", lag, "s", "Delay of the model behind the measurement, by correlation.", lag_note
         ),

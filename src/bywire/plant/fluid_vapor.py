@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
     T_dry: Temperature
     """boiling point of fluid without water"""
     T_wet: Temperature
-    """boiling point of fluid with ``water_wet``"""
+    """boiling point of fluid with the water fraction ``water_wet``"""
     water_wet: Annotated[float, Unit("1", 0.037), Field(gt=0, lt=1, allow_inf_nan=False)]
     """fraction of water in wet fluid, up to which these values are valid"""
     V: Volume

@@ -27,13 +27,13 @@ class Parameters(ParameterSet):
     T_pr: Torque
     """friction torque due to seal preload, at zero pressure"""
     f_cfr_p: TorquePerPressure
-    """growth of the Coulomb torque with pressure, apply direction"""
+    """growth of the Coulomb torque with pressure in the apply direction"""
     f_cfr_n: TorquePerPressure
-    """growth of the Coulomb torque with pressure, release direction"""
+    """growth of the Coulomb torque with pressure in the release direction"""
     k_brk_p: BreakawayFactor
-    """ratio of breakaway torque to Coulomb torque, apply direction"""
+    """ratio of breakaway torque to Coulomb torque in the apply direction"""
     k_brk_n: BreakawayFactor
-    """ratio of breakaway torque to Coulomb torque, release direction"""
+    """ratio of breakaway torque to Coulomb torque in the release direction"""
     c: InverseSpeed
     """decay of the Stribeck peak with speed"""
     mu_T: RotaryDamping

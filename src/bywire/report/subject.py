@@ -153,12 +153,17 @@ def origins_text(parameters: str) -> str:
     return f"values of {parameters}: {', '.join(parts)} ('bywire list {parameters}' shows each)"
 
 
+def origins_block(parameters: str) -> Paragraph:
+    """Return the origins of the values of a parameter set as a sentence."""
+    origins = origins_text(parameters)
+    return Paragraph(f"{origins[0].upper()}{origins[1:]}.")
+
+
 def source_block(parameters: str) -> Paragraph:
     """Return the source of a parameter set and the origins of its values."""
     source = PARAMETER_SETS.find(parameters).source
     text = f"Source of the parameters: {source}. " if source else ""
-    origins = origins_text(parameters)
-    return Paragraph(f"{text}{origins[0].upper()}{origins[1:]}.")
+    return Paragraph(f"{text}{origins_block(parameters).text}")
 
 
 def changes_block(

@@ -111,7 +111,7 @@ class Request:
             raise RefusedError(
                 413,
                 f"{what} of {self.length / 1e6:,.1f} MB is too large (at most "
-                f"{most / 1e6:,.1f} MB). Copy it to the served folder, or make it smaller with "
+                f"{most / 1e6:,.1f} MB). Copy it to the served folder, or reduce its size with "
                 "'bywire convert'",
             )
 

@@ -261,7 +261,7 @@ def frequency_response(
     estimate_error: ErrorEstimate = True,
     side: Side = "",
 ) -> "FrequencyResponse":
-    """Measure a closed loop's frequency response by amplitude, with friction, limits and sampling.
+    """Measure a closed loop's frequency response per amplitude, with friction, limits and sampling.
 
     Parameters
     ----------

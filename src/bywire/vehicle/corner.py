@@ -48,7 +48,7 @@ class Corner(Assembly[ParT, MemoryT]):
     t_locked = Integral("s", "time during which the wheel is locked")
 
     F_x = Wire("N", "braking force of the tire", 1e3)
-    N_x = Wire("N", "load of the wheel", 4e3)
+    N_x = Wire("N", "load on the wheel", 4e3)
     v_tread = Shown("m/s", "tread speed", 20.0)
     slip = Shown("1", "braking slip", 0.1)
     sliding = Shown("1", "tire slides")

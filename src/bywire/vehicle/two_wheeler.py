@@ -76,8 +76,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
 
     F_f = Wire("N", "braking force of the front tire", 1e3)
     F_r = Wire("N", "braking force of the rear tire", 1e3)
-    N_f = Wire("N", "load of the front wheel", 1e3)
-    N_r = Wire("N", "load of the rear wheel", 1e3)
+    N_f = Wire("N", "load on the front wheel", 1e3)
+    N_r = Wire("N", "load on the rear wheel", 1e3)
     T_f = Wire("N*m", "torque that the front brake can hold", 300.0)
     T_r = Wire("N*m", "torque that the rear brake can hold", 300.0)
     v_f = Shown("m/s", "front tread speed", 20.0)

@@ -41,5 +41,5 @@ def test_wheel_turns_until_it_stands_and_then_marks_the_road(tmp_path: Path) -> 
 def test_refuses_what_does_not_drive() -> None:
     with pytest.raises(ParameterError, match=r"motorcycle-brake has no animation"):
         bywire.run("hard-braking", animate=True)
-    with pytest.raises(ParameterError, match="single runs"):
+    with pytest.raises(ParameterError, match="single run"):
         bywire.run("straight-stop", over="vehicle.road.grip=0.5, 1", animate=True)

@@ -27,7 +27,7 @@ BAD = [
     ("wedge.alpha=20mm", "mm cannot be converted to rad"),
     ("screw.eta_f=0", "screw.eta_f = 0.0 is not valid: it must be > 0 and <= 1"),
     ("screw.eta_f=1.01", "screw.eta_f = 1.01 is not valid: it must be > 0 and <= 1"),
-    ("screw.eta_b=-0.1", "screw.eta_b = -0.1 is not valid: it must be >= 0 and <= 1"),
+    ("screw.eta_b=-10.1", "screw.eta_b = -10.1 is not valid: it must be >= -10 and <= 1"),
     ("screw.eta_b=1.1", "screw.eta_b = 1.1 is not valid"),
     ("wedge.mu_B=-0.1", "wedge.mu_B = -0.1 is not valid: it must be >= 0"),
     ("wedge_friction.stopped_disc=stuck", "did you mean 'stick'?"),

@@ -206,7 +206,7 @@ def test_a_bench_refuses_a_stimulus_that_its_ecu_would_refuse(value: float) -> N
     from dataclasses import replace
 
     wrong = replace(run, stimulus=stimulus, duration=0.02)
-    with pytest.raises(ParameterError, match=rf"power_off is {value:g} at t = .*: it must be >= 0"):
+    with pytest.raises(ParameterError, match=rf"power_off is {value:g} at t = .* must be >= 0"):
         bywire.simulate(wrong)
 
 

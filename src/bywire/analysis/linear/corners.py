@@ -756,7 +756,7 @@ class _Number:
             return self._chain(elementary.cos(a), -elementary.sin(a))
         if name == "arctan":
             return self._chain(float(np.arctan(a)), 1.0 / (1.0 + a * a))
-        raise TypeError(f"ops.{name} has no slope: define it in _Number._bywire_op")
+        raise TypeError(f"ops.{name} has no slope. Define it in _Number._bywire_op")
 
 
 class _Choice:
@@ -766,7 +766,7 @@ class _Choice:
         self.holds = bool(holds)
 
     def __bool__(self) -> bool:
-        raise TypeError("an equation must not branch on a value: use ops.where")
+        raise TypeError("an equation must not branch on a value. Use ops.where")
 
     def __and__(self, other: Any) -> _Choice:
         return _Choice(self.holds and _holds(other))

@@ -60,7 +60,7 @@ def build(tested: TestedModel) -> Experiment:
 
 GENERIC = GenericExperiment(
     name="release",
-    summary="fall of any input: time until the output is released, and its residual level",
+    summary="drop in any input: time until the output is released, and its residual level",
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={

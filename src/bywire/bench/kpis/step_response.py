@@ -253,7 +253,8 @@ def steady_state_error(response: Response) -> float | Undefined:
 def ripple(response: Response) -> float | Undefined:
     """Peak-to-peak value of the response in the steady-state window.
 
-    Maximum minus minimum sample. Smoothing also removes ripple of its own period from this figure.
+    Maximum minus minimum sample. The default window is the last 20 % of the time after the step.
+    Smoothing also removes ripple of its own period from this figure.
     """
     if not response.has_window:
         return _without_window(response.low, response.high)

@@ -181,13 +181,13 @@ def peak_slip_rear(stop: Stop, slip_rear: Samples) -> float:
 
 @measure("s")
 def excess_slip_time_front(stop: Stop, slip_front: Samples, setting: Setting) -> float:
-    """Time during which slip exceeds twice that of peak adhesion, at speeds above 2.5 m/s."""
+    """Time during which slip exceeds twice the slip at peak adhesion, at speeds above 2.5 m/s."""
     return _excess_slip_time(stop, slip_front, setting.peak_slip)
 
 
 @measure("s")
 def excess_slip_time_rear(stop: Stop, slip_rear: Samples, setting: Setting) -> float:
-    """Time during which slip exceeds twice that of peak adhesion, at speeds above 2.5 m/s."""
+    """Time during which slip exceeds twice the slip at peak adhesion, at speeds above 2.5 m/s."""
     return _excess_slip_time(stop, slip_rear, setting.peak_slip)
 
 

@@ -22,7 +22,7 @@ class Parameters(ParameterSet):
     mean: Level
     """mean value, and the value before ``t_start``"""
     amplitude: Amplitude
-    """amplitude of every single harmonic"""
+    """amplitude of each harmonic"""
     f_base: Frequency
     """base frequency: first harmonic and spacing; its inverse is the period"""
     n: Count

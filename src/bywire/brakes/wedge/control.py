@@ -22,8 +22,8 @@ class Stimulus(NamedTuple):
     """External inputs. ``command.mode`` determines which of them act."""
 
     M_set: Annotated[float, Signal("N*m", "moment demand", 300.0)]
-    theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
-    theta_2_set: Annotated[float, Signal("rad", "demanded angle 2", 3.0)]
+    theta_1_set: Annotated[float, Signal("rad", "angle demand 1", 3.0)]
+    theta_2_set: Annotated[float, Signal("rad", "angle demand 2", 3.0)]
     i_1_set: Annotated[float, Signal("A", "current demand 1", 5.0)]
     i_2_set: Annotated[float, Signal("A", "current demand 2", 5.0)]
     power_off: Annotated[float, Signal("1", "power stages switched off"), Ge(0), Le(1)]

@@ -29,8 +29,8 @@ class Command(NamedTuple):
 class Demand(NamedTuple):
     """A rig operator's demands on one motor. The motor's mode selects the active demand."""
 
-    theta: Annotated[float, Signal("rad", "demanded angle", 3.0)]
-    i: Annotated[float, Signal("A", "demanded current", 5.0)]
+    theta: Annotated[float, Signal("rad", "angle demand", 3.0)]
+    i: Annotated[float, Signal("A", "current demand", 5.0)]
 
 
 def wire(drive: Drive, motor: Motor, i_ref: float, on: float, force: float, par: Par) -> None:

@@ -481,7 +481,7 @@ def truth(par: MotorcycleParameters, options: Options) -> Mapping[str, float]:
     """Return the true values of the linear synthetic brake; raise for the whole brake."""
     if options.plant == "brake":
         raise ParameterError(
-            "the whole brake has no true values of eq. (22). Set plant = 'eq-22' to compare "
+            "the whole brake has no true values for eq. (22). Set plant = 'eq-22' to compare "
             "estimates with the values of the simulation",
             name="plant",
             valid="'eq-22'",

@@ -76,7 +76,7 @@ class Options(ParameterSet):
     f_max: Frequency
     """highest dither frequency"""
     frequencies: Count
-    """number of frequencies, spaced about logarithmically"""
+    """number of frequencies, approximately logarithmically spaced"""
     stuck_max: Fraction
     """maximum fraction of time stuck"""
     band_max: Fraction
@@ -344,7 +344,7 @@ def _maps(
             "worst_stuck",
             "gain",
             "frequency",
-            f"Fraction of time in which the piston sticks, {where}.",
+            f"Fraction of time during which the piston sticks, {where}.",
             marks,
             limits,
         ),

@@ -28,7 +28,7 @@ class StopOptions(ParameterSet):
     v_0: RidingSpeed
     """initial speed"""
     M_brake: SomeMoment
-    """demanded moment from time zero on"""
+    """moment demand from time zero"""
     surface: SurfaceName
     """road surface"""
     T_disc: Temperature

@@ -54,7 +54,7 @@ class Options(ParameterSet):
     """The maneuver."""
 
     M_brake: SomeMoment
-    """demanded moment"""
+    """moment demand"""
     Omega_0: DiscSpeed
     """initial disc speed; with the flywheel's inertia, it determines the energy to absorb"""
     t_hold: Duration

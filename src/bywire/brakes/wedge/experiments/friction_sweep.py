@@ -64,7 +64,7 @@ class Options(ParameterSet):
     """
 
     M_step: SomeMoment
-    """demanded moment"""
+    """moment demand"""
     t_hold: Duration
     """recording time after the step"""
     mu_B: Coefficients

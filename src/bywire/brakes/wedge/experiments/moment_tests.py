@@ -140,7 +140,7 @@ class PulsesOptions(ParameterSet):
     """The braking maneuver."""
 
     M_high: SomeMoment
-    """demanded moment"""
+    """moment demand"""
     low: Fraction
     """fraction of the moment to which the pulses fall"""
     t_hold: Duration
@@ -245,7 +245,7 @@ class RampOptions(ParameterSet):
     """The braking maneuver."""
 
     M_high: SomeMoment
-    """demanded moment at the start and at the end of the ramp"""
+    """moment demand at the start and at the end of the ramp"""
     M_low: SomeMoment
     """moment from which the ramp starts"""
     t_hold: Duration
@@ -340,7 +340,7 @@ class LargePulseOptions(ParameterSet):
     """The braking maneuver."""
 
     M_high: SomeMoment
-    """demanded moment"""
+    """moment demand"""
     t_pulse: Duration
     """length of the pulse"""
     t_end: Duration

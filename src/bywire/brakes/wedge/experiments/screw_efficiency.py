@@ -77,7 +77,7 @@ class EfficiencyOptions(ParameterSet):
     omega_slow: SlowSpeed
     """speed of the motion"""
     settle: Duration
-    """time in which the force builds up, before the motion"""
+    """time for the force to build up before the motion"""
     duration: Duration
     """time in motion"""
 

@@ -234,7 +234,7 @@ def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
                     f"i_{side}",
                     "y_F",
                     f"with the motion of q_{side}, the screw would gain {-least:.3g} N*m while "
-                    f"{word}; or q_{side} is from the wrong shaft",
+                    f"{word}, unless q_{side} is from the wrong shaft",
                 )
 
 

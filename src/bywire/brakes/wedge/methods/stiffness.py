@@ -48,7 +48,7 @@ _S, _W, _C, _ZERO, _CLOSED, _PLAY = range(6)
 _LAW = slice(6, 11)
 _SENSOR, _HEART, _LOOP = slice(11, 15), slice(15, 19), 19
 MEANINGS: Mapping[str, tuple[str, str]] = {
-    "zero_of_travel": ("m", "travel without force on the sensor, d_0"),
+    "zero_of_travel": ("m", "travel at which no force acts on the sensor, d_0"),
     "tips_touch": ("m", "travel at which the tips touch, d_c"),
     "free_play": ("m", "travel from there to the pull on the wedge, d_c - d_t"),
     **force_calibration.LAW_MEANINGS,

@@ -40,8 +40,8 @@ class Memory(NamedTuple):
 class Stimulus(NamedTuple):
     """Demands of the operator. ``rig.mode_1`` and ``rig.mode_2`` select the active demands."""
 
-    theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
-    theta_2_set: Annotated[float, Signal("rad", "demanded angle 2", 3.0)]
+    theta_1_set: Annotated[float, Signal("rad", "angle demand 1", 3.0)]
+    theta_2_set: Annotated[float, Signal("rad", "angle demand 2", 3.0)]
     i_1_set: Annotated[float, Signal("A", "current demand 1", 5.0)]
     i_2_set: Annotated[float, Signal("A", "current demand 2", 5.0)]
 

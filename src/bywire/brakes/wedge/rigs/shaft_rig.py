@@ -35,7 +35,7 @@ class Memory(NamedTuple):
 class Stimulus(NamedTuple):
     """Demands of the operator. ``rig.mode_1`` selects the active demand."""
 
-    theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
+    theta_1_set: Annotated[float, Signal("rad", "angle demand 1", 3.0)]
     i_1_set: Annotated[float, Signal("A", "current demand 1", 5.0)]
 
 

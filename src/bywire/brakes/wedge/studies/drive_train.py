@@ -363,11 +363,11 @@ class Options(ParameterSet):
     """The stop, the friction coefficients, and the designs to compare."""
 
     moment: SomeMoment
-    """demanded moment, as one step"""
+    """moment demand, applied as a single step"""
     t_90: Duration
     """time within which the measured moment must reach 90 %"""
     t_hold: Duration
-    """length of the moment demand"""
+    """duration of the moment demand"""
     t_release: Duration
     """time within which the brake must release after the demand"""
     counted: Literal["build-up-and-hold", "whole-pulse"]
