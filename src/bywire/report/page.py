@@ -204,7 +204,8 @@ def _block(block: Block, numbered: _Numbered) -> str:
     return f"<figure>\n{caption}{table}\n</figure>"
 
 
-_VERDICTS = ("verdict", "agrees", "result")
+_VERDICTS = ("verdict", "agrees", "result", "class")
+_OF_MANY = ("result", "class")  # headings of verdicts on cases that many columns describe
 _DETAILS = ("numerical error", "tolerance", "kind")
 
 
@@ -215,7 +216,7 @@ def _verdicts_first(table: Table) -> Table:
     if verdict is None:
         return table
     first = [k for k in range(verdict) if headings[k] not in _DETAILS]
-    if headings[verdict] == "result":  # of many cases, described by many columns
+    if headings[verdict] in _OF_MANY:
         first = first[:1]
     order = [*first, verdict, *(k for k in range(len(headings)) if k not in {*first, verdict})]
     return Table(
