@@ -8,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.authoring import Case
-from emb_caliper.model import EmbCaliper
-from emb_caliper.parameters import CaliperBrakeParameters, DriveMode
-from emb_caliper.trim import memory_at, state_at
+from emb_caliper.parameters import BrakeParameters, DriveMode
+from emb_caliper.trim import brake_with, memory_at, state_at
 
 Array = NDArray[np.float64]
 
 
 def case_from_rest(
-    par: CaliperBrakeParameters,
+    par: BrakeParameters,
     drive: DriveMode,
     F: float,
     stimulus: Callable[[Array], Mapping[str, Array]],
@@ -42,7 +41,7 @@ def case_from_rest(
     driven = par.replace({"drive": drive})
     return Case(
         label,
-        EmbCaliper(),
+        brake_with(driven),
         driven,
         state_at(F, driven),
         memory_at(F, driven),

@@ -1,4 +1,8 @@
-"""The brake's ECU with force, speed and current control in a cascade, at their sample times."""
+"""The brake's ECU with force, speed and current control in a cascade, at their sample times.
+
+Force and speed control, and the ideal source, are the same for every motor. They read and write
+the memory's fields by name.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +56,7 @@ class Readings(NamedTuple):
     i: Annotated[float, Signal("A", "motor current", 10.0)]
 
 
-def force_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+def force_tick(r: Any, m: Any, u: Stimulus, par: Any) -> Any:
     """Read the force sensor, and run force control once to update the speed set point."""
     share = adc.sample(r.F_cl / par.F_span, u.noise_F, par.adc)
     m = m._replace(F_meas=share * par.F_span, theta_meas=r.theta)
@@ -60,13 +64,18 @@ def force_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
 
 
 def speed_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Run speed control once to update the current set point."""
+    """Run speed control of a DC motor once to update the current set point."""
+    return speed_control(r, m, u, par, par.motor.K_e)
+
+
+def speed_control(r: Any, m: Any, u: Stimulus, par: Any, K_t: float) -> Any:
+    """Run speed control once; ``K_t``: torque per current [N*m/A]."""
     m = m._replace(omega_meas=r.omega)
     if par.drive == "speed":
         m = m._replace(omega_ref=u.omega_set)
     state, out = limited_pi.speed(
         limited_pi.SpeedState(m.speed_integral),
-        limited_pi.SpeedInput(m.omega_ref - m.omega_meas, _ahead(m, par)),
+        limited_pi.SpeedInput(m.omega_ref - m.omega_meas, _ahead(m, par, K_t)),
         par.ecu.T_force,
         par.ecu.speed,
     )
@@ -89,7 +98,7 @@ def current_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
     return m._replace(duty=out.duty, sat_duty=saturated, current_integral=state.integral)
 
 
-def source_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+def source_tick(r: Any, m: Any, u: Stimulus, par: Any) -> Any:
     """Update the voltage of an ideal source."""
     return m._replace(v_source=u.v_set)
 
@@ -99,7 +108,7 @@ def travel_per_angle(par: Any) -> float:
     return ball_screw.slope(par.screw) / planetary_gear.ratio(par.gear)
 
 
-def _force_control(m: Memory, u: Stimulus, par: Par) -> Memory:
+def _force_control(m: Any, u: Stimulus, par: Any) -> Any:
     """Return the memory with a new speed set point, which presses the pads or parks the piston."""
     ecu = par.ecu
     state, out = limited_pi.force(
@@ -121,7 +130,7 @@ def _force_control(m: Memory, u: Stimulus, par: Par) -> Memory:
     )
 
 
-def _factor(m: Memory, par: Par) -> float:
+def _factor(m: Any, par: Any) -> float:
     """Return the factor on the gains of the force controller."""
     if par.ecu.scheduling == "off":
         return 1.0
@@ -129,8 +138,8 @@ def _factor(m: Memory, par: Par) -> float:
     return par.caliper.k_1 / floating_caliper.stiffness(n, par.caliper)
 
 
-def _ahead(m: Memory, par: Par) -> float:
+def _ahead(m: Any, par: Any, K_t: float) -> float:
     """Return the feed-forward current [A]."""
     if par.ecu.load == "off":
         return 0.0
-    return travel_per_angle(par) * ops.fmax(m.F_meas, 0.0) / par.motor.K_e
+    return travel_per_angle(par) * ops.fmax(m.F_meas, 0.0) / K_t

@@ -12,3 +12,9 @@ CHANNELS = Channels(
         Channel("bridge", "bridge", "1", "duty", "drive", stuck=1.0, task="current"),
     ),
 )
+# The encoder has no channel here, because a falsified angle would also turn the measured currents.
+# The fault encoder.turned of its element turns only the reading.
+PMSM_CHANNELS = Channels(
+    "emb-caliper-pmsm",
+    (Channel("current", "current sensors (q axis)", "A", "i_q", offset=1.0),),
+)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any, ClassVar, Self
 
-from bywire.authoring import Assembly, Bounds, Integral, Part, Role, Shown, Task, Wire
-from bywire.core import ops
+from bywire.authoring import Integral, Part, Role, Shown, Wire
 from bywire.plant import battery_supply, dc_motor, end_stop, h_bridge
 from emb_caliper import ecu
 from emb_caliper.elements import (
@@ -16,13 +16,15 @@ from emb_caliper.elements import (
     planetary_gear,
     rotor,
 )
+from emb_caliper.mechanics import CaliperBrake, clamp_force
 from emb_caliper.parameters import CaliperBrakeParameters as Par
 
 
-class EmbCaliper(Assembly[Par, ecu.Memory]):
-    """Brake with one dry friction on the shaft, and contacts at the pads and two end stops."""
+class EmbCaliper(CaliperBrake[Par, ecu.Memory]):
+    """The brake with a DC motor."""
 
     name: ClassVar[str] = "emb-caliper"
+    laws: ClassVar[ModuleType] = ecu
     Memory: ClassVar = ecu.Memory
     Stimulus: ClassVar = ecu.Stimulus
     frictions: ClassVar[tuple[str, ...]] = ("omega",)
@@ -81,76 +83,22 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
         "t_stuck",
     )
 
-    def wire(self, w: Self) -> None:
-        """Connect the parts: electrics, motion from rotor to pads, loads from pads to rotor."""
+    def electrics(self, w: Self) -> None:
+        """Connect battery, bridge and motor."""
         w.voltage, w.i_dc = _electrics(w)
         w.supply.u = battery_supply.Input(w.i_dc)
         w.motor.u = dc_motor.Input(w.voltage, w.rotor.x.omega)
         w.torque = dc_motor.output(w.motor.x, w.motor.par).torque
-        piston = travel(w.rotor.x, w.par)
-        w.pads.u = floating_caliper.Input(piston.x, piston.v)
-        stop = w.par.stop
-        w.stop.u = end_stop.Input(piston.x, piston.v, stop.x_rest, stop.x_end)
-        force = w.pads.f.F_cl + end_stop.load(w.stop.f)
-        carrier = _carrier(w.rotor.x, w.par)
-        w.screw.u = ball_screw.Input(carrier.theta, carrier.omega, force)
-        load = ball_screw.output(w.screw.u, w.screw.par).load
-        w.gear.u = planetary_gear.Input(w.rotor.x.theta, w.rotor.x.omega, load)
-        w.dry.u = load_friction.Input(w.rotor.x.omega, w.pads.f.F_cl)
-        load = planetary_gear.output(w.gear.u, w.gear.par).load
-        w.rotor.u = rotor.Input(w.torque, load, 0.0)
 
-    def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the limits of the dry friction torque on the shaft."""
-        limit = load_friction.output(w.dry.u, w.dry.par).torque
-        return ((-limit, limit),)
+    def source_power(self, w: Self) -> float:
+        """Return the power of battery or source [W]."""
+        if w.par.drive == "voltage":
+            return w.voltage * w.motor.x.i
+        return battery_supply.power_source(w.supply.u, w.supply.par)
 
-    def power(self, w: Self) -> dict[str, float]:
-        """Return the power of source and dry friction, and 1 while the shaft is stuck."""
-        battery = battery_supply.power_source(w.supply.u, w.supply.par)
-        return {
-            "E_source": w.voltage * w.motor.x.i if w.par.drive == "voltage" else battery,
-            "E_friction": load_friction.power_loss(w.reaction[0], w.rotor.x.omega),
-            "t_stuck": ops.where(w.rotor.x.omega == 0, 1.0, 0.0),
-        }
-
-    def record(self, w: Self) -> dict[str, float]:
-        """Return the recorded signals other than states, wires and losses."""
-        battery = battery_supply.power_source(w.supply.u, w.supply.par)
-        return {
-            "T_fr": -w.reaction[0],
-            "F_stop": end_stop.load(w.stop.f),
-            "stuck": ops.where(w.rotor.x.omega == 0, 1.0, 0.0),
-            "P_el": w.voltage * w.motor.x.i if w.par.drive == "voltage" else battery,
-        }
-
-    def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return the controllers of the drive mode, from the outer loop inward."""
-        current = Task("current", par.ecu.T_current, _reading(ecu.current_tick))
-        if par.drive == "voltage":
-            return (Task("source", par.ecu.T_current, _reading(ecu.source_tick)),)
-        if par.drive == "current":
-            return (current,)
-        slow = ("force", ecu.force_tick), ("speed", ecu.speed_tick)
-        outer = tuple(Task(name, par.ecu.T_force, _reading(law)) for name, law in slow)
-        return (*outer, current)
-
-    def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return the warnings about a recording."""
-        warnings = super().watch(recording, par)
-        if "F_stop" in recording and bool((recording["F_stop"] != 0).any()):
-            warnings.append("the piston reached an end stop")
-        return warnings
-
-
-def travel(x: rotor.State, par: Par) -> ball_screw.Output:
-    """Return the motion of the piston."""
-    carrier = _carrier(x, par)
-    return ball_screw.output(ball_screw.Input(carrier.theta, carrier.omega, 0.0), par.screw)
-
-
-def _carrier(x: rotor.State, par: Par) -> planetary_gear.Output:
-    return planetary_gear.output(planetary_gear.Input(x.theta, x.omega, 0.0), par.gear)
+    def sensed(self, law: Callable[..., ecu.Memory]) -> Callable[[Any, Any, Any, Any], ecu.Memory]:
+        """Return a controller's tick with the sensor readings."""
+        return _reading(law)
 
 
 def _electrics(w: EmbCaliper) -> tuple[float, float]:
@@ -168,8 +116,6 @@ def _reading(law: Callable[..., ecu.Memory]) -> Callable[[Any, Any, Any, Any], e
     """Return a controller's tick with the sensor readings."""
 
     def tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
-        piston = travel(rotor.State(x.theta, x.omega), par)
-        F_cl = floating_caliper.forces(floating_caliper.Input(piston.x, piston.v), par.caliper)
-        return law(ecu.Readings(F_cl.F_cl, x.theta, x.omega, x.i), m, u, par)
+        return law(ecu.Readings(clamp_force(x, par), x.theta, x.omega, x.i), m, u, par)
 
     return tick

@@ -4,25 +4,50 @@ from __future__ import annotations
 
 from bywire.authoring import LineRole, Panel, Panels, Sliders, Trace
 
+_FORCE = Panel(
+    "clamp force",
+    (Trace("F_cl"), Trace("F_meas", LineRole.SECOND), Trace("F_ref", LineRole.SET_POINT)),
+    height=1.8,
+)
+_SPEED = Panel(
+    "motor speed",
+    (Trace("omega"), Trace("omega_ref", LineRole.SET_POINT)),
+    saturation="sat_speed",
+)
+_TORQUE = Panel("torque", (Trace("torque"), Trace("T_fr", LineRole.SECOND)))
+_POWER = Panel("power", (Trace("P_el"),))
+
 PANELS = Panels(
     "emb-caliper",
     ("emb-caliper",),
     (
-        Panel(
-            "clamp force",
-            (Trace("F_cl"), Trace("F_meas", LineRole.SECOND), Trace("F_ref", LineRole.SET_POINT)),
-            height=1.8,
-        ),
-        Panel(
-            "motor speed",
-            (Trace("omega"), Trace("omega_ref", LineRole.SET_POINT)),
-            saturation="sat_speed",
-        ),
+        _FORCE,
+        _SPEED,
         Panel(
             "current", (Trace("i"), Trace("i_ref", LineRole.SET_POINT)), saturation="sat_current"
         ),
-        Panel("torque", (Trace("torque"), Trace("T_fr", LineRole.SECOND))),
-        Panel("power", (Trace("P_el"),)),
+        _TORQUE,
+        _POWER,
+    ),
+)
+PMSM_PANELS = Panels(
+    "emb-caliper-pmsm",
+    ("emb-caliper-pmsm",),
+    (
+        _FORCE,
+        _SPEED,
+        Panel(
+            "currents",
+            (
+                Trace("i_q"),
+                Trace("i_q_ref", LineRole.SET_POINT),
+                Trace("i_d", LineRole.SECOND),
+            ),
+            saturation="sat_current",
+        ),
+        Panel("voltages", (Trace("v_q"), Trace("v_d", LineRole.SECOND)), saturation="sat_duty"),
+        _TORQUE,
+        _POWER,
     ),
 )
 
@@ -39,3 +64,15 @@ SLIDERS = Sliders(
     ),
 )
 """parameters with the most effect on braking, at the top of this brake's pages"""
+PMSM_SLIDERS = Sliders(
+    "emb-caliper-pmsm",
+    ("emb-caliper-pmsm",),
+    (
+        "screw.lead",
+        "friction.C",
+        "motor.R",
+        "motor.psi",
+        "caliper.clearance",
+        "ecu.current.omega_c",
+    ),
+)

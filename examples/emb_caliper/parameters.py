@@ -7,8 +7,17 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from bywire.authoring import Duration, ParameterSet, Unit
-from bywire.control import current_pi
-from bywire.plant import adc, battery_supply, dc_motor, end_stop, h_bridge
+from bywire.control import current_pi, field_oriented
+from bywire.plant import (
+    adc,
+    angle_sensor,
+    battery_supply,
+    dc_motor,
+    end_stop,
+    h_bridge,
+    inverter,
+    pmsm,
+)
 from emb_caliper.elements import (
     ball_screw,
     floating_caliper,
@@ -43,8 +52,8 @@ class StopParameters(end_stop.Parameters):
         return self
 
 
-class EcuParameters(ParameterSet):
-    """Sample times and controllers of the ECU, and its model of the brake.
+class CascadeParameters(ParameterSet):
+    """Sample times, force and speed control of the ECU, and its model of the brake.
 
     ``scheduling``: ``"stiffness"`` divides the gains of the force controller by the expected
     stiffness at the piston travel, relative to the stiffness at first contact. ``load``:
@@ -65,10 +74,9 @@ class EcuParameters(ParameterSet):
     """whether feed-forward adds the current that holds the force"""
     force: limited_pi.ForceParameters
     speed: limited_pi.SpeedParameters
-    current: current_pi.Parameters
 
     @model_validator(mode="after")
-    def _samples_fit(self) -> EcuParameters:
+    def _samples_fit(self) -> CascadeParameters:
         ratio = self.T_force / self.T_current
         if ratio < 1.0 or abs(ratio - round(ratio)) > 1e-9:
             raise ValueError(
@@ -78,8 +86,20 @@ class EcuParameters(ParameterSet):
         return self
 
 
+class EcuParameters(CascadeParameters):
+    """The ECU of a DC motor."""
+
+    current: current_pi.Parameters
+
+
+class FieldOrientedEcuParameters(CascadeParameters):
+    """The ECU of a synchronous motor."""
+
+    current: field_oriented.Parameters
+
+
 class CaliperBrakeParameters(ParameterSet):
-    """The whole brake with plant, force sensor and ECU."""
+    """The whole brake with a DC motor: plant, force sensor and ECU."""
 
     supply: battery_supply.Parameters
     bridge: h_bridge.Parameters
@@ -99,10 +119,53 @@ class CaliperBrakeParameters(ParameterSet):
 
     @model_validator(mode="after")
     def _stop_is_beyond(self) -> CaliperBrakeParameters:
-        needed = self.caliper.clearance + self.caliper.n_max
-        if not self.stop.x_end > needed:
-            raise ValueError(
-                f"stop.x_end = {self.stop.x_end:g} m must be > caliper.clearance + caliper.n_max "
-                f"= {needed:g} m, the end of the caliper's measured curve"
-            )
+        _require_room(self.caliper, self.stop)
         return self
+
+
+class SynchronousBrakeParameters(ParameterSet):
+    """The whole brake with a synchronous motor: plant, sensors and ECU."""
+
+    supply: battery_supply.Parameters
+    inverter: inverter.Parameters
+    motor: pmsm.Parameters
+    encoder: angle_sensor.Parameters
+    rotor: rotor.Parameters
+    friction: load_friction.Parameters
+    gear: planetary_gear.Parameters
+    screw: ball_screw.Parameters
+    caliper: floating_caliper.Parameters
+    stop: StopParameters
+    F_span: Force
+    """full-scale clamp force of the force sensor"""
+    adc: adc.Parameters
+    ecu: FieldOrientedEcuParameters
+    drive: DriveMode
+    """quantity that the stimulus commands; "voltage" is an ideal source that turns with the rotor
+    and drives its q axis"""
+
+    @model_validator(mode="after")
+    def _stop_is_beyond(self) -> SynchronousBrakeParameters:
+        _require_room(self.caliper, self.stop)
+        return self
+
+
+BrakeParameters = CaliperBrakeParameters | SynchronousBrakeParameters
+"""parameters of the brake with either motor"""
+
+
+def torque_constant(par: BrakeParameters) -> float:
+    """Return the torque per motor current [N*m/A]; for a synchronous motor, per amplitude."""
+    if isinstance(par.motor, dc_motor.Parameters):
+        return par.motor.K_e
+    return 1.5 * par.motor.p * par.motor.psi
+
+
+def _require_room(caliper: floating_caliper.Parameters, stop: StopParameters) -> None:
+    """Reject an end stop within the caliper's measured curve."""
+    needed = caliper.clearance + caliper.n_max
+    if not stop.x_end > needed:
+        raise ValueError(
+            f"stop.x_end = {stop.x_end:g} m must be > caliper.clearance + caliper.n_max "
+            f"= {needed:g} m, the end of the caliper's measured curve"
+        )

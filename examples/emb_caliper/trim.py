@@ -5,14 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from bywire.authoring import ParameterError, zeros
-from bywire.plant import dc_motor
-from emb_caliper.ecu import Memory, travel_per_angle
+from bywire.core import ops
+from bywire.plant import dc_motor, pmsm
+from emb_caliper import ecu, ecu_pmsm
+from emb_caliper.ecu import travel_per_angle
 from emb_caliper.elements import floating_caliper, rotor
 from emb_caliper.model import EmbCaliper
-from emb_caliper.parameters import CaliperBrakeParameters as Par
+from emb_caliper.models.pmsm import EmbCaliperPmsm
+from emb_caliper.parameters import BrakeParameters, torque_constant
 
 
-def overlap_at(F: float, par: Par) -> float:
+def overlap_at(F: float, par: BrakeParameters) -> float:
     """Return the overlap [m] at rest at a clamp force [N].
 
     Raises
@@ -35,37 +38,65 @@ def overlap_at(F: float, par: Par) -> float:
     return float(brentq(missing, 0.0, par.caliper.n_max, xtol=1e-15, rtol=1e-14))
 
 
-def holding_current(F: float, par: Par) -> float:
+def brake_with(par: BrakeParameters) -> EmbCaliper | EmbCaliperPmsm:
+    """Return the brake that has these parameters."""
+    return EmbCaliper() if isinstance(par.motor, dc_motor.Parameters) else EmbCaliperPmsm()
+
+
+def holding_current(F: float, par: BrakeParameters) -> float:
     """Return the current [A] that balances a clamp force [N] without friction."""
-    return travel_per_angle(par) * F / par.motor.K_e
+    return travel_per_angle(par) * F / torque_constant(par)
 
 
-def state_at(F: float, par: Par) -> Any:
+def holding_voltage(F: float, par: BrakeParameters) -> float:
+    """Return the voltage [V] that drives this current at rest, along the q axis of a PMSM."""
+    R = par.motor.R_m if isinstance(par.motor, dc_motor.Parameters) else par.motor.R
+    return R * holding_current(F, par)
+
+
+def state_at(F: float, par: BrakeParameters) -> Any:
     """Return the state at rest at a clamp force [N]. At zero force the piston is parked at 0."""
     x = par.caliper.clearance + overlap_at(F, par) if F > 0.0 else 0.0
-    return EmbCaliper.state(
-        motor=dc_motor.State(holding_current(F, par)),
-        rotor=rotor.State(x / travel_per_angle(par), 0.0),
+    i = holding_current(F, par)
+    turned = rotor.State(x / travel_per_angle(par), 0.0)
+    if isinstance(par.motor, dc_motor.Parameters):
+        return EmbCaliper.state(motor=dc_motor.State(i), rotor=turned)
+    return EmbCaliperPmsm.state(motor=pmsm.State(0.0, i), rotor=turned)
+
+
+def memory_at(F: float, par: BrakeParameters) -> Any:
+    """Return the memory with which each controller, or the ideal source, holds this state."""
+    i, theta, v = holding_current(F, par), state_at(F, par).theta, holding_voltage(F, par)
+    cascade = {
+        "F_meas": F,
+        "theta_meas": theta,
+        "F_ref": F,
+        "i_ref": i,
+        "v_source": v,
+        "parked": float(par.ecu.F_on > F),
+        "speed_integral": i - (i if par.ecu.load == "fed-forward" else 0.0),
+    }
+    if isinstance(par.motor, dc_motor.Parameters):
+        duty = _duty(v, i, par)
+        return zeros(ecu.Memory)._replace(**cascade, duty=duty, current_integral=duty)
+    duty = _duty(v, 1.5 * i, par)
+    theta_e = par.motor.p * theta
+    alpha, beta = -duty * ops.sin(theta_e), duty * ops.cos(theta_e)
+    return zeros(ecu_pmsm.Memory)._replace(
+        **cascade,
+        i_q_ref=i,
+        duty_alpha=alpha,
+        duty_beta=beta,
+        next_alpha=alpha,
+        next_beta=beta,
+        z_q=v,
     )
 
 
-def memory_at(F: float, par: Par) -> Memory:
-    """Return the memory with which each controller, or the ideal source, holds this state."""
-    i = holding_current(F, par)
-    v = par.motor.R_m * i
+def _duty(v: float, i: float, par: BrakeParameters) -> float:
+    """Return the duty D of a voltage if the battery supplies the current D i."""
     # Solve D (V_bat - R_bat D i) = v by fixed-point iteration (contraction R_bat i / V_bat).
     duty = v / par.supply.V_bat
     for _ in range(50):
         duty = v / (par.supply.V_bat - par.supply.R_bat * duty * i)
-    fed = i if par.ecu.load == "fed-forward" else 0.0
-    return zeros(Memory)._replace(
-        F_meas=F,
-        theta_meas=state_at(F, par).theta,
-        F_ref=F,
-        i_ref=i,
-        duty=duty,
-        v_source=v,
-        parked=float(par.ecu.F_on > F),
-        speed_integral=i - fed,
-        current_integral=duty,
-    )
+    return duty

@@ -59,6 +59,7 @@ def test_experiments_of_ours_name_what_there_is(name: str) -> None:
         ("", "", "", "", ""),
         ("figures", "time-traces", "time-trace", "unknown figure 'time-trace'", "PUSH = "),
         ("assembly", '"spring-axis", "a', '"spring-axes", "a', "did you mean 'spring-axis'", ""),
+        ("assembly", 's",))', 's",), variants=("spring-axes",))', "did you mean 'spring-axis'", ""),
         ("stimuli", 'F_set": np', 'F_sett": np', "'F_sett': did you mean 'F_set'?", "PUSH = "),
         ("key figures", '["x"]', '["xx"]', "xx", "    return (Kpi("),
         (

@@ -196,6 +196,14 @@ def test_field_weakening_reaches_a_speed_beyond_the_back_emf():
     assert plain.end.i_q < 0.5
 
 
+def test_a_stalled_motor_keeps_its_field():
+    """The resistance, and not the magnets, needs the voltage above the reserve."""
+    run = Run(SERVO, 38.0, ticks=3000, k_fw=300.0, i_max=40.0)
+    assert SERVO["R"] * 38.0 > 0.95 * inverter.largest_voltage(24.0)
+    assert run.end.i_q == pytest.approx(38.0, abs=0.1)
+    assert abs(run.end.i_d) < 0.1
+
+
 @pytest.mark.parametrize("stage", [{}, {"law": "dead time", "V_f": 0.4}])
 def test_power_is_balanced(stage):
     run = Run(SERVO, 5.0, 200.0, stage)

@@ -19,7 +19,7 @@ from bywire.authoring import (
 )
 from emb_caliper.case import Array, case_from_rest
 from emb_caliper.experiments.slow_strokes import TopForce
-from emb_caliper.parameters import CaliperBrakeParameters
+from emb_caliper.parameters import BrakeParameters
 
 
 class Options(ParameterSet):
@@ -42,9 +42,7 @@ def demand(t: Array, options: Options) -> Array:
     return np.interp(t, corners, (0.0, o.F_top, o.F_top, 0.0))
 
 
-def cases(
-    par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: BrakeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
     """Return the single run, which starts from the parked piston."""
     return (
         case_from_rest(
@@ -95,6 +93,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="apply-release",
     assembly="emb-caliper",
+    variants=("emb-caliper-pmsm",),
     summary="ramp to {F_top:kN}, hold, ramp down, park: tracking, holding current, release",
     options=Options,
     defaults=Options(F_top=25e3, t_ramp=0.5, t_hold=0.5, duration=2.0),

@@ -23,7 +23,7 @@ from bywire.authoring import (
     units_of,
 )
 from emb_caliper.case import case_from_rest, step_at_zero
-from emb_caliper.parameters import CaliperBrakeParameters
+from emb_caliper.parameters import BrakeParameters
 
 ClampForce = Annotated[float, Unit("N", 1e4), Field(ge=0, allow_inf_nan=False)]
 
@@ -41,9 +41,7 @@ class Options(ParameterSet):
     """time before the step, in which loop and converter settle"""
 
 
-def cases(
-    par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: BrakeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
     """Return the single run."""
     stimulus = step_at_zero("F_set", options.F_from, options.F_to)
     return (
@@ -77,6 +75,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="clamp-step",
     assembly="emb-caliper",
+    variants=("emb-caliper-pmsm",),
     summary="step of the force demand, from the parked piston to {F_to:kN}",
     options=Options,
     defaults=Options(F_from=0.0, F_to=25e3, duration=0.8, settle=0.02),

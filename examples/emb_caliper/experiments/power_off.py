@@ -10,7 +10,7 @@ from bywire.authoring import Case, Duration, Experiment, Kpi, ParameterSet, Reco
 from emb_caliper.case import case_from_rest, step_at_zero
 from emb_caliper.ecu import travel_per_angle
 from emb_caliper.experiments.slow_strokes import TopForce
-from emb_caliper.parameters import CaliperBrakeParameters, DriveMode
+from emb_caliper.parameters import BrakeParameters, DriveMode
 from emb_caliper.trim import memory_at
 
 
@@ -25,7 +25,7 @@ class Options(ParameterSet):
     """recording time after the current ends"""
 
 
-def held_force(par: CaliperBrakeParameters) -> float:
+def held_force(par: BrakeParameters) -> float:
     """Return the maximum clamp force [N] that friction holds without current, inf for any force.
 
     If the load torque increases faster than the friction, (N - G) F = T_s.
@@ -34,9 +34,7 @@ def held_force(par: CaliperBrakeParameters) -> float:
     return par.friction.T_s / grows if grows > 0.0 else float("inf")
 
 
-def cases(
-    par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: BrakeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
     """Return the single run. The current loop models the open circuit."""
     drive: DriveMode
     held, F = memory_at(options.F_from, par), options.F_from
@@ -64,6 +62,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="power-off",
     assembly="emb-caliper",
+    variants=("emb-caliper-pmsm",),
     summary="power loss at {F_from:kN}: clamp force that friction holds without current",
     options=Options,
     defaults=Options(F_from=25e3, circuit="open", duration=1.0),

@@ -21,7 +21,7 @@ from bywire.authoring import (
     Unit,
 )
 from emb_caliper.case import Array, case_from_rest
-from emb_caliper.parameters import CaliperBrakeParameters
+from emb_caliper.parameters import BrakeParameters
 from emb_caliper.trim import state_at
 
 TopForce = Annotated[float, Unit("N", 1e4), Field(gt=0, allow_inf_nan=False)]
@@ -44,16 +44,14 @@ class Options(ParameterSet):
         return self
 
 
-def turns(par: CaliperBrakeParameters, options: Options) -> Array:
+def turns(par: BrakeParameters, options: Options) -> Array:
     """Return the times [s] at which the speed demand changes, including the first and the last."""
     stroke = state_at(options.F_top, par).theta
     times = [stroke / speed for speed in options.speeds for _ in range(2)]
     return np.concatenate(([0.0], np.cumsum(times)))
 
 
-def cases(
-    par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: BrakeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
     """Return the single run, which starts from the parked piston, under speed control."""
     instants = turns(par, options)
     demands = np.array([way * speed for speed in options.speeds for way in (1.0, -1.0)])
@@ -103,6 +101,7 @@ def _current_at(run: xr.Dataset, level: float, moving: Array) -> float:
 EXPERIMENT = Experiment(
     name="slow-strokes",
     assembly="emb-caliper",
+    variants=("emb-caliper-pmsm",),
     summary="to {F_top:kN} and back at constant motor speeds: friction versus load and speed",
     options=Options,
     defaults=Options(F_top=30e3, speeds=(20.0, 50.0, 120.0), record=2e-4),

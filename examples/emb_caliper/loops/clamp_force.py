@@ -14,6 +14,7 @@ def at(par: ParameterSet, value: float) -> Point:
 LOOP = Loop(
     name="clamp-force",
     assembly="emb-caliper",
+    variants=("emb-caliper-pmsm",),
     summary="force control at 1 kHz, around speed and current control",
     at=FORCE,
     inputs=("F_set",),

@@ -7,9 +7,8 @@ from typing import Any, cast
 
 from bywire.authoring import ParameterError, ParameterSet, Point, Quantity, zeros
 from emb_caliper.ecu import Stimulus
-from emb_caliper.model import EmbCaliper
-from emb_caliper.parameters import CaliperBrakeParameters, DriveMode
-from emb_caliper.trim import memory_at, state_at
+from emb_caliper.parameters import BrakeParameters, DriveMode
+from emb_caliper.trim import brake_with, holding_current, holding_voltage, memory_at, state_at
 
 FORCE = Quantity("clamp force", "N", 20e3)
 
@@ -28,7 +27,7 @@ def point(par: ParameterSet, F: float, drive: DriveMode, step: float = 20e-6) ->
     ParameterError
         If the pads do not touch.
     """
-    driven = cast(CaliperBrakeParameters, par.replace({"drive": drive}))
+    driven = cast(BrakeParameters, par.replace({"drive": drive}))
     if driven.ecu.F_on > F:
         raise ParameterError(
             f"clamp force = {F:g} N is not a valid operating point, because the ECU parks the "
@@ -38,8 +37,8 @@ def point(par: ParameterSet, F: float, drive: DriveMode, step: float = 20e-6) ->
     held = {
         "force": {"F_set": F},
         "speed": {},
-        "current": {"i_set": state.i},
-        "voltage": {"v_set": driven.motor.R_m * state.i},
+        "current": {"i_set": holding_current(F, driven)},
+        "voltage": {"v_set": holding_voltage(F, driven)},
     }[drive]
     stimulus = zeros(Stimulus)._replace(**held)
-    return Point(EmbCaliper(), driven, state, memory_at(F, driven), stimulus, step)
+    return Point(brake_with(driven), driven, state, memory_at(F, driven), stimulus, step)

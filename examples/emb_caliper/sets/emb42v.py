@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from bywire.authoring import CitedSet, chosen, derived
-from emb_caliper.parameters import CaliperBrakeParameters
+from emb_caliper.parameters import CaliperBrakeParameters, SynchronousBrakeParameters
 
 SOURCE = (
     "C. Line, C. Manzie, M. C. Good, Electromechanical brake modeling and control: from PI to MPC, "
@@ -88,6 +88,54 @@ _MODIFIED = {
     "ecu.force.k_i": chosen(0.2, "same as k_p"),
 }
 
+# A synchronous motor that makes the same torque per current, with the same copper loss.
+_K_T = 0.0697  # torque per amplitude [N*m/A], as the DC motor's
+_SERVO = "servo motor Teknic M-2310P (4 pole pairs, 0.36 ohm, 0.2 mH)"
+_BELIEVED = "identified without error"
+_SYNCHRONOUS = {
+    "inverter.law": chosen("ideal", "averaged; a fault adds dead time"),
+    "inverter.f_s": chosen(10e3, "one carrier period per sample"),
+    "inverter.t_d": chosen(1e-6, "MOSFETs of this class"),
+    "inverter.V_f": chosen(0.0, "MOSFETs conduct in both directions"),
+    "inverter.i_th": chosen(0.05, "2 C_oss V_dc / t_d with 0.6 nF"),
+    "motor.p": chosen(4.0, _SERVO),
+    "motor.R": derived(0.5 / 1.5, "copper loss of the DC motor at the same torque, 1.5 R = R_m"),
+    "motor.L_d": derived(0.5 / 1.5 * 0.2e-3 / 0.36, f"time constant L/R of the {_SERVO}"),
+    "motor.L_q": derived(lambda par: par.motor.L_d, "surface magnets"),
+    "motor.psi": derived(
+        lambda par: _K_T / (1.5 * par.motor.p), "torque constant of the DC motor, 1.5 p psi = K_e"
+    ),
+    "motor.iron": chosen("off", "the drive train's viscous friction includes it"),
+    "motor.c_h": chosen(0.0, "no value available"),
+    "motor.c_e": chosen(0.0, "no value available"),
+    "encoder.law": chosen("ideal", "a fault adds errors"),
+    "encoder.eps_0": chosen(0.0, "calibrated"),
+    "encoder.eps_1": chosen(0.0, "centered"),
+    "encoder.phi_1": chosen(0.0, "without effect while eps_1 = 0"),
+    "encoder.eps_2": chosen(0.0, "centered"),
+    "encoder.phi_2": chosen(0.0, "without effect while eps_2 = 0"),
+    "encoder.counts": chosen(4096.0, "12 bits"),
+}
+_FIELD_ORIENTED = {
+    "ecu.T_current": chosen(1e-4, "common rate of field-oriented control; five steps of 20 us"),
+    "ecu.current.omega_c": derived(
+        lambda par: 1.0 / (3.0 * par.ecu.T_current), "phase margin of 61.4 degrees"
+    ),
+    "ecu.current.p": derived(lambda par: par.motor.p, _BELIEVED),
+    "ecu.current.R_hat": derived(lambda par: par.motor.R, _BELIEVED),
+    "ecu.current.L_d_hat": derived(lambda par: par.motor.L_d, _BELIEVED),
+    "ecu.current.L_q_hat": derived(lambda par: par.motor.L_q, _BELIEVED),
+    "ecu.current.psi_hat": derived(lambda par: par.motor.psi, _BELIEVED),
+    "ecu.current.lead": chosen(1.5, "a delay of one sample, and half a sample of holding"),
+    "ecu.current.i_max": derived(lambda par: par.ecu.speed.i_max, "limit of the speed control"),
+    "ecu.current.k_fw": chosen(0.0, "off: the back EMF stays below the voltage limit"),
+    "ecu.current.reserve": chosen(0.95, "without effect while k_fw = 0"),
+}
+
+
+_OF_DC_MOTOR = "bridge.", "motor.", "ecu.current."
+_ANY_MOTOR = {k: v for k, v in (_PLANT | _ECU).items() if not k.startswith(_OF_DC_MOTOR)}
+
 CASCADE = CitedSet(
     name="emb42v",
     assembly="emb-caliper",
@@ -103,4 +151,12 @@ MODIFIED = CitedSet(
     summary="the same brake with gains that follow the stiffness, and load feed-forward",
     parameter_class=CaliperBrakeParameters,
     values=_PLANT | _ECU | _MODIFIED,
+)
+SYNCHRONOUS = CitedSet(
+    name="emb42v-pmsm",
+    assembly="emb-caliper-pmsm",
+    source=SOURCE,
+    summary="the same brake with a synchronous motor and field-oriented control",
+    parameter_class=SynchronousBrakeParameters,
+    values=_ANY_MOTOR | _SYNCHRONOUS | _FIELD_ORIENTED,
 )

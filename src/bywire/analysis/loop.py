@@ -237,6 +237,9 @@ class Loop:
     side
         Side of its linear models if the operating point is on the kink of an operation (see
         `corners.read_sides`); if empty, such a point raises an error.
+    variants
+        Names of further assemblies that contain it, for example the same brake with another motor.
+        ``point`` returns the assembly that fits its parameters.
     """
 
     name: str
@@ -264,6 +267,11 @@ class Loop:
     analog: bool = False
     locked: tuple[str, ...] = ()
     side: str = ""
+    variants: tuple[str, ...] = ()
+
+    def is_in(self, assembly: str) -> bool:
+        """Return whether an assembly contains the loop."""
+        return assembly == self.assembly or assembly in self.variants
 
     def require_number(self, par: ParameterSet, name: str) -> None:
         """Reject a name that is neither the operating quantity nor a parameter.

@@ -225,7 +225,7 @@ def _with_parameters(
         bench = method.bench
         changes = parsed(type(bench.par), bench.overrides, "parameter")
         return ChosenMethod(method, options, bench.parameters, bench.par, changes)
-    cited = set_for(f"method {method.name!r}", method.assembly, parameters)
+    cited = set_for(f"method {method.name!r}", (method.assembly,), parameters)
     base = cited.parameters()
     for key in overrides:
         if key in options.flat() and key not in base.flat():
@@ -568,7 +568,7 @@ def _alternatives(parameters: str) -> list[str]:
     return [
         experiment.name
         for experiment in EXPERIMENTS.all().values()
-        if experiment.assembly == assembly and experiment.driven_unit is None
+        if experiment.tests(assembly) and experiment.driven_unit is None
     ]
 
 

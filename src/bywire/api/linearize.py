@@ -278,7 +278,9 @@ def _plant_case(
     """
     read_sides(side)
     plant = replace(PLANTS.find(name), side=side)
-    chosen_set, par = parameters_for(f"plant {plant.name!r}", plant.assembly, parameters, overrides)
+    chosen_set, par = parameters_for(
+        f"plant {plant.name!r}", (plant.assembly,), parameters, overrides
+    )
     quantity, value = _operating_point(plant, at)
     kind, omega = _friction(friction, speed)
     return PlantCase(plant, chosen_set, par, PlantPoint(quantity, value, kind, omega))

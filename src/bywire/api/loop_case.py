@@ -115,7 +115,8 @@ def loop_case(
     """
     read_sides(side)
     loop = replace(LOOPS.find(name), side=side)
-    name, par = parameters_for(f"loop {loop.name!r}", loop.assembly, parameters, changes)
+    assemblies = (loop.assembly, *loop.variants)
+    name, par = parameters_for(f"loop {loop.name!r}", assemblies, parameters, changes)
     value = number(at, loop.at.unit, loop.at.name) if at else loop.at.default
     return LoopCase(loop, name, par, value)
 

@@ -12,12 +12,12 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.values import parsed
 
 
-def set_for(subject: str, assembly: str, name: str) -> CitedSet:
+def set_for(subject: str, assemblies: tuple[str, ...], name: str) -> CitedSet:
     """Return a parameter set of a brake.
 
     Parameters
     ----------
-    subject, assembly, name
+    subject, assemblies, name
         See `parameters_for`.
 
     Raises
@@ -25,20 +25,20 @@ def set_for(subject: str, assembly: str, name: str) -> CitedSet:
     InputError
         If the name is unknown, or the parameter set is for another brake.
     """
-    cited = PARAMETER_SETS.find(name or main_set(assembly))
-    if cited.assembly != assembly:
+    cited = PARAMETER_SETS.find(name or main_set(assemblies[0]))
+    if cited.assembly not in assemblies:
         raise ParameterError(
-            f"{subject} needs parameters of a {assembly}, but parameter set {cited.name!r} belongs "
-            f"to a {cited.assembly}. Choose another parameter set",
+            f"{subject} needs parameters of a {' or '.join(assemblies)}, but parameter set "
+            f"{cited.name!r} belongs to a {cited.assembly}. Choose another parameter set",
             name="parameters",
             value=cited.name,
-            valid=assembly,
+            valid=" or ".join(assemblies),
         )
     return cited
 
 
 def parameters_for(
-    subject: str, assembly: str, name: str, changes: Mapping[str, Any]
+    subject: str, assemblies: tuple[str, ...], name: str, changes: Mapping[str, Any]
 ) -> tuple[str, ParameterSet]:
     """Return name and values of a parameter set, with changes.
 
@@ -46,10 +46,10 @@ def parameters_for(
     ----------
     subject
         Subject of the use case, for example ``"loop 'moment'"``.
-    assembly
-        Brake to which the subject belongs.
+    assemblies
+        Brakes to which the subject belongs, the first one by default.
     name
-        Parameter set. If empty, the brake's main set.
+        Parameter set. If empty, the first brake's main set.
     changes
         Parameters by dotted name or pattern, with units or relative to their values (see
         `settled`).
@@ -59,6 +59,6 @@ def parameters_for(
     InputError
         If a name is unknown, a value is out of range, or the parameter set is for another brake.
     """
-    cited = set_for(subject, assembly, name)
+    cited = set_for(subject, assemblies, name)
     base = cited.parameters()
     return cited.name, base.replace(parsed(type(base), settled(base, changes), "parameter"))

@@ -183,7 +183,7 @@ def asked_study(name: str, parameters: str, overrides: Mapping[str, Any]) -> Ask
         See `bywire.study`.
     """
     definition = STUDIES.find(name)
-    cited = set_for(f"study {definition.name!r}", definition.assembly, parameters)
+    cited = set_for(f"study {definition.name!r}", (definition.assembly,), parameters)
     return definition, cited.name, *_changed(definition, cited.parameters(), overrides)
 
 

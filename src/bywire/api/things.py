@@ -42,7 +42,8 @@ def _summary(thing: Any) -> str:
 
 
 def _with_assembly(thing: Any) -> str:
-    return f"{thing.summary} ({thing.assembly})"
+    assemblies = (thing.assembly, *getattr(thing, "variants", ()))
+    return f"{thing.summary} ({', '.join(assemblies)})"
 
 
 class ThingKind(NamedTuple):
@@ -512,7 +513,9 @@ def _system(model: type[Any]) -> Object:
     ]
     there = {
         kind.topic.replace("_", " "): ", ".join(
-            name for name, thing in kind.things().items() if thing.assembly == model.name
+            name
+            for name, thing in kind.things().items()
+            if model.name in (thing.assembly, *getattr(thing, "variants", ()))
         )
         for kind in thing_kinds()
         if kind.has_assembly
@@ -575,7 +578,7 @@ def _driven(case: Case) -> list[tuple[str, str, str]]:
 def _experiment(experiment: Experiment) -> Object:
     return {
         "summary": experiment.summary,
-        "assembly": experiment.assembly,
+        "assembly": ", ".join((experiment.assembly, *experiment.variants)),
         **_drive(experiment),
         "kpis": [{"name": n, "unit": readable_units(u)} for n, u in experiment.kpis.items()],
         "options": _option_rows(experiment.options, experiment.defaults),
@@ -660,7 +663,7 @@ def _loop(loop: Loop) -> Object:
     at = f"{loop.at.name} [{unit_text(display_unit(loop.at.unit))}]"
     return {
         "summary": loop.summary,
-        "assembly": loop.assembly,
+        "assembly": ", ".join((loop.assembly, *loop.variants)),
         "system": model.name,
         "at": at,
         "signals": rows,

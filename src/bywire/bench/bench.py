@@ -135,7 +135,7 @@ class Bench:
         if chosen.assembly != self.system:
             by_name = f"assembly = {self.assembly!r}"
             by_set = f"parameter set {known.name!r} is for a {known.assembly}"
-            fit = [n for n, s in PARAMETER_SETS.all().items() if s.assembly == chosen.assembly]
+            fit = [n for n, s in PARAMETER_SETS.all().items() if chosen.tests(s.assembly)]
             raise ParameterError(
                 f"experiment {chosen.name!r} tests a {chosen.assembly}, but "
                 f"{by_name if self.assembly else by_set}. Its parameter sets are {', '.join(fit)}",

@@ -11,14 +11,14 @@ from typing import Annotated, Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.changes import is_relative, settled
-from bywire.bench.experiment import EXPERIMENTS, Experiment
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.faults.fault_section import Course, numbers_as_text
 from bywire.bench.faults.injected import checked_sections
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, experiment_of, usual_set
 from bywire.bench.stimulus import STIMULI, stimulus_sections
 from bywire.core.arguments import checked
 from bywire.core.callers import option
-from bywire.core.catalog import PARAMETER_SETS, CitedSet, sets_of_loaded
+from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, UnknownNameError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.section import Hint, Section, Table, table_of
@@ -255,19 +255,19 @@ def _require_names(content: Mapping[str, Any]) -> None:
         if known is None:
             example, valid = next(iter(EXPERIMENTS.all())), "those of 'bywire list experiments'"
         else:
-            names = _of_assembly(EXPERIMENTS.all(), known.assembly)
+            each = EXPERIMENTS.all().values()
+            names = [experiment.name for experiment in each if experiment.tests(known.assembly)]
             example = names[0]
             valid = ", ".join((*names, *GENERIC_EXPERIMENTS.all()))
         raise _missing("experiment", example, valid)
     if cited is None and isinstance(experiment, str):
         example = usual_set(experiment)
         assembly = PARAMETER_SETS.find(example).assembly
-        valid = ", ".join(_of_assembly(PARAMETER_SETS.all(), assembly))
+        tested = EXPERIMENTS.get(experiment)
+        assemblies = (assembly,) if tested is None else (assembly, *tested.variants)
+        sets = PARAMETER_SETS.all().values()
+        valid = ", ".join(each.name for each in sets if each.assembly in assemblies)
         raise _missing("parameters", example, valid)
-
-
-def _of_assembly(known: Mapping[str, CitedSet] | Mapping[str, Experiment], name: str) -> list[str]:
-    return [each.name for each in known.values() if each.assembly == name]
 
 
 def _missing(key: str, example: str, valid: str) -> ParameterError:

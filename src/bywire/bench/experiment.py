@@ -318,6 +318,9 @@ class Experiment:
     named
         ``named(options)``: unit of every key figure by name, if a table among the options
         determines the key figures; ``kpis`` then contains the units for the default options.
+    variants
+        Names of further assemblies that the experiment also tests, for example the same brake with
+        another motor. ``cases`` starts the assembly that fits its parameters.
     formerly
         Earlier name, which now belongs to an experiment for any brake. Bench files with that name
         still work if their options distinguish the two experiments.
@@ -347,10 +350,19 @@ class Experiment:
     begins_at: Mapping[str, str] = field(default_factory=dict)
     compared: Mapping[str, str] = field(default_factory=dict)
     formerly: str = ""
+    variants: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         template = getattr(self.summary, "template", self.summary)
         object.__setattr__(self, "summary", summary_of(template, self.defaults))
+
+    def tests(self, assembly: str) -> bool:
+        """Return whether the experiment tests an assembly."""
+        return assembly == self.assembly or assembly in self.variants
+
+    def of(self, assembly: str) -> Experiment:
+        """Return the experiment with one of its variants as the tested assembly."""
+        return self if assembly == self.assembly else replace(self, assembly=assembly)
 
     def summary_with(self, options: Any, varied: Collection[str] = ()) -> str:
         """Return the summary with values of options; ``varied``: options with several values."""

@@ -381,12 +381,12 @@ def experiment_of(
     cited = PARAMETER_SETS.find(parameters)
     system = assembly or cited.assembly
     likely = EXPERIMENTS.guess(name)
-    if likely is not None and likely.assembly == system:
-        return likely
+    if likely is not None and likely.tests(system):
+        return likely.of(system)
     brake = PARAMETER_SETS.owner(parameters)
     its_own = EXPERIMENTS.own(brake, name)
-    if its_own is not None and its_own.assembly == system:
-        return its_own
+    if its_own is not None and its_own.tests(system):
+        return its_own.of(system)
     known = GENERIC_EXPERIMENTS.all()
     if name in known:
         former = _former(name, brake, system, options or {}, known[name])

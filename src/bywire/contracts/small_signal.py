@@ -85,7 +85,7 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
 def _require_loops_off_corners(trial: Trial) -> None:
     """Reject the model's loops whose usual operating point is at a kink."""
     for loop in LOOPS.all().values():
-        if loop.assembly == trial.model.name:
+        if loop.is_in(trial.model.name):
             try:
                 loop.gain_and_closed(trial.start.par, loop.at.default)
             except CornerError:

@@ -244,7 +244,11 @@ OF_AN_EXPERIMENT: dict[str, Contract] = {
 
 
 def demands_on_experiment(experiment: Experiment, figures: Collection[str]) -> Demands:
-    """Yield all contracts of an experiment."""
-    rehearsal, place = Rehearsal(experiment, figures), Place(*EXPERIMENTS.place(experiment.name))
-    for contract, test in OF_AN_EXPERIMENT.items():
-        yield Demand(contract, experiment.name, rehearsal, test, place)
+    """Yield all contracts of an experiment, for each assembly that it tests."""
+    place = Place(*EXPERIMENTS.place(experiment.name))
+    for assembly in (experiment.assembly, *experiment.variants):
+        is_main = assembly == experiment.assembly
+        subject = experiment.name if is_main else f"{experiment.name} ({assembly})"
+        rehearsal = Rehearsal(experiment.of(assembly), figures)
+        for contract, test in OF_AN_EXPERIMENT.items():
+            yield Demand(contract, subject, rehearsal, test, place)

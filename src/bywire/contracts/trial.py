@@ -141,7 +141,7 @@ def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> S
 
 def _points(model: Model, par: ParameterSet) -> Iterator[Start]:
     for loop in LOOPS.all().values():
-        if loop.assembly == model.name:
+        if loop.is_in(model.name):
             try:
                 point = loop.point(par, loop.at.default)
             except InputError:  # the loop is for other choices
@@ -160,7 +160,7 @@ def _points(model: Model, par: ParameterSet) -> Iterator[Start]:
 def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]:
     """Yield the starts of the experiments of a model, or of all experiments of a brake."""
     for experiment in (EXPERIMENTS.of(module) if module else EXPERIMENTS.all()).values():
-        if not module and experiment.assembly != model.name:
+        if not module and not experiment.tests(model.name):
             continue
         try:
             cases = (experiment.preview or experiment.cases)(par, experiment.defaults, None)

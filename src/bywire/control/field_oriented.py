@@ -120,6 +120,13 @@ def _root(square: float, par: Parameters) -> float:
     return ops.where(square > least, ops.sqrt(ops.fmax(square, least)), 0.0 * par.i_max)
 
 
+def _relief(v_d: Volts, v_q: Volts, omega_e: float, size: Volts, par: Parameters) -> float:
+    """Return how much a current against the magnets reduces the voltage, from -1 to 1."""
+    X = omega_e * par.L_d_hat
+    slope = par.R_hat * v_d + X * v_q
+    return slope / (ops.sqrt(par.R_hat * par.R_hat + X * X) * size)
+
+
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
     r"""Advance the controller by one sample.
 
@@ -130,6 +137,17 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     A voltage above :math:`V_{dc}/\sqrt 3` is limited in magnitude and keeps its direction. The
     integral parts follow the limited voltage. The voltage then gets a lead angle: the rotation of
     the rotor until the middle of the sample in which the inverter applies the voltage.
+
+    Field weakening integrates the voltage above the reserve, weighted by how much a current against
+    the magnets reduces it,
+
+    .. math::
+        \frac{R v_d + \omega_e L_d v_q}{\sqrt{R^2 + \omega_e^2 L_d^2}\, |v|}
+
+    Notes
+    -----
+    Without this weight, a slow motor whose resistance needs the whole voltage would weaken its
+    field completely. No current would then remain for the torque.
     """
     omega_e = par.p * u.omega
     c, s = ops.cos(u.theta_e), ops.sin(u.theta_e)
@@ -141,12 +159,16 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     v_max = u.V_dc / math.sqrt(3.0)
     size = ops.sqrt(v_d * v_d + v_q * v_q)
     is_limited = size > v_max
-    share = v_max / ops.fmax(size, v_max)  # a voltage of zero has no direction
+    divisor = ops.fmax(size, v_max)  # a voltage of zero has no direction
+    share = v_max / divisor
     k_i = par.R_hat * par.omega_c
+    excess = size - par.reserve * v_max
+    relief = _relief(v_d, v_q, omega_e, divisor, par)
+    weakened = ops.where(excess > 0.0, excess * relief, excess)
     state = State(
         z_d=x.z_d + T * (k_i * e_d + (share - 1.0) * v_d * par.omega_c),
         z_q=x.z_q + T * (k_i * e_q + (share - 1.0) * v_q * par.omega_c),
-        i_fw=ops.clip(x.i_fw + T * par.k_fw * (par.reserve * v_max - size), -par.i_max, 0.0),
+        i_fw=ops.clip(x.i_fw - T * par.k_fw * weakened, -par.i_max, 0.0),
     )
     ahead = u.theta_e + par.lead * omega_e * T
     c, s = ops.cos(ahead), ops.sin(ahead)

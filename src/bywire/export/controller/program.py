@@ -257,13 +257,13 @@ def _translated(
         names=set(public.values()),
         derivations=Derivations(refused),
     )
-    home = type(model).__module__
+    homes = {cls.__module__ for cls in type(model).__mro__}
 
     def is_plant(function: FunctionType, arguments: Mapping[str, Any]) -> bool:
         if _ROOMS & set(function.__module__.split(".")[1:]):
             return True
         classes = {_class_of(each) for each in arguments.values()}
-        return function.__module__ == home and model.Memory not in classes
+        return function.__module__ in homes and model.Memory not in classes
 
     made = Translation(structs, is_plant, name, names=set(public.values()), copied=copied)
     steps: list[Step] = []

@@ -144,7 +144,7 @@ def loops_of(made: Exported) -> list[LoopSource]:
     shown = [
         loop
         for loop in LOOPS.all().values()
-        if loop.proof == made.bench.experiment and made.bench.definition.assembly == loop.assembly
+        if loop.proof == made.bench.experiment and loop.is_in(made.bench.definition.assembly)
     ]
     sources = [loop_source(loop, par) for loop in shown]
     return [source for source in sources if source is not None]

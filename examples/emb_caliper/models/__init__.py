@@ -1,0 +1,1 @@
+"""The brake with other motors, one file each."""
