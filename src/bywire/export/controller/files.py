@@ -556,8 +556,8 @@ def _plant(program: Program) -> str:
         return ""
     return (
         f"{program.name}_io.c contains the plant interface of each tick ({', '.join(names)}): "
-        "sensors and converters as simulated by the bench, and power-stage limits. On a target, the "
-        "hardware replaces this file."
+        "sensors and converters as simulated by the bench, and power-stage limits. On a target, "
+        "the hardware replaces this file."
     )
 
 
