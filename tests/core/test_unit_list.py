@@ -311,7 +311,7 @@ def test_products_as_people_write_them(text, factor, symbol):
         ("U", "is not known"),
         ("Nm/foo", "'foo' in 'Nm/foo' is not known"),
         ("tex", "is not known"),
-        ("g", "two meanings. Write 'gram' or 'g_n'"),
+        ("g", "ambiguous. Use 'gram' or 'g_n'"),
         ("C", "'coulomb' or 'degC'"),
         ("C/s", "'coulomb' or 'degC'"),
         ("F", "'farad' or 'degF'"),

@@ -247,8 +247,8 @@ def mdf_with(tmp_path, block, offset, layout, value):
         (b"##DG", 32, "<Q", 2**40, "is damaged: bywire cannot read it as an MDF file"),
         (b"##CG", 24 + 48 + 8, "<Q", HUGE, "the limit is 8 GiB"),
         (b"##CG", 24 + 48 + 8, "<Q", 401, "401 records .*400 could be read"),
-        (b"##CN", 24 + 64 + 4, "<I", 2**20, "reaches to byte 1048584"),
-        (b"##CN", 24 + 64 + 4, "<I", 20, "reaches to byte 28"),
+        (b"##CN", 24 + 64 + 4, "<I", 2**20, "extends to byte 1048584"),
+        (b"##CN", 24 + 64 + 4, "<I", 20, "extends to byte 28"),
         (b"##CN", 8, "<Q", HUGE, "is damaged: bywire cannot read it as an MDF file"),
     ],
 )

@@ -126,7 +126,7 @@ class FaultCampaign(Answer):
     Parameters
     ----------
     findings
-        Effect, fault tolerant time and time to detection of every fault; times in s.
+        Effect, fault-tolerant time and time to detection of every fault; times in s.
     folder
         Folder of the outcomes. None if they are not saved.
     nominal
@@ -163,9 +163,10 @@ class FaultCampaign(Answer):
             f"evaluated on {plan.healthy - plan.tuning} other healthy runs, of which "
             f"{alarms.count} raise an "
             f"alarm ({100 * alarms.low:.2g} to {100 * alarms.high:.2g} %)",
-            f"coverage is the fraction of dangerous runs that detect the fault within the fault "
-            f"tolerant time of its worst run ({weight}). This is the case in {cases.count} of "
-            f"{cases.cases} runs ({100 * cases.low:.3g} to {100 * cases.high:.3g} %)",
+            "coverage is the fraction of dangerous runs in which a monitor detects the fault "
+            f"within its fault-tolerant time ({weight}). Monitors detect it in time in "
+            f"{cases.count} of {cases.cases} runs ({100 * cases.low:.3g} to "
+            f"{100 * cases.high:.3g} %)",
         ]
         if not plan.varied:
             notes.append(
@@ -180,7 +181,7 @@ class FaultCampaign(Answer):
         return notes
 
     def document(self) -> Document:
-        """Return the table of faults, coverage, fault tolerant times and detection times."""
+        """Return the table of faults, coverage, fault-tolerant times and detection times."""
         plan, bench, findings = self.findings.plan, self.findings.plan.bench, self.findings
         subject = Subject.of_bench(bench, plan.name, varied=[each.name for each in plan.varied])
         table = TableBlock(self._table())

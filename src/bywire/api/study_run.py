@@ -279,7 +279,7 @@ def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
     texts += of_the_bench if not texts else []
     if failed := findings.failures:
         texts.append(
-            f"{len(failed)} of {count} cases have no result. They count as missing every "
+            f"{len(failed)} of {count} cases have no result. They count as failing every "
             "requirement"
         )
     if findings.spreads:
@@ -298,7 +298,7 @@ def _undefined(findings: Findings) -> list[str]:
             cases.setdefault(lacking, []).append(each.demand.figure)
     return [
         f"{', '.join(names)}: not defined in {number} of {len(findings.cases)} cases, which count "
-        "as missing the requirement"
+        "as failing the requirement"
         for number, names in cases.items()
     ]
 

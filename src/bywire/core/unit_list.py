@@ -310,7 +310,7 @@ def scale_of(text: str) -> Scale:
         plain = _plain(text)
         two = next(names for key, names in _TWO_MEANINGS.items() if key in _names(plain))
         raise UnknownUnitError(
-            f"the unit {quoted(text)} has two meanings. Write {two[0]!r} or {two[1]!r} in it",
+            f"the unit {quoted(text)} is ambiguous. Use {two[0]!r} or {two[1]!r} instead",
             value=quoted(text),
             valid=f"{two[0]!r} or {two[1]!r}",
         )

@@ -299,7 +299,7 @@ def case_of(bench: Bench, label: str) -> Case:
     cases = {case.label: case for case in bench.cases()}
     if not cases:
         raise ParameterError(
-            f"experiment {bench.experiment!r} has no run. Choose another experiment",
+            f"experiment {bench.experiment!r} has no run to replay. Choose another experiment",
             name="experiment",
             value=bench.experiment,
         )

@@ -41,7 +41,7 @@ class Parameters(ParameterSet):
     psi: Weight
     """fraction of the friction heat that enters the discs"""
     A: Area
-    """disc surface that the air cools"""
+    """disc surface area cooled by the air"""
     h_0: Convection
     """convection coefficient at rest"""
     h_1: Convection

@@ -167,7 +167,7 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
     known = z[np.isfinite(z)]
     if not known.size:
         raise ParameterError(
-            f"contour: {shown.values} contains no number that can be drawn",
+            f"contour: {shown.values} has no finite value to plot",
             name=shown.values,
         )
     figure, (axes,) = style.new_figure(4.4)

@@ -796,7 +796,7 @@ def _triangular(entry: _Entry) -> Distribution:
     mode = entry.level("mode", entry.nominal)
     ends = f"{entry.amount(low)}, {entry.amount(mode)}, {entry.amount(high)}"
     if not low <= mode <= high or not low < high:
-        raise entry.refused(f"low, mode and high must increase, but are {ends}")
+        raise entry.refused(f"low, mode and high must be in increasing order, but are {ends}")
     law = Triangular((mode - low) / (high - low), low, high - low)
     return _frozen(entry, law, f"triangular, {ends}", low, high)
 

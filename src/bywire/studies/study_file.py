@@ -256,7 +256,7 @@ def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
     if "cases" in section and kind in SPANNED:
         raise ParameterError(
             f"[design] cases has no effect for {kind!r}, because quantities and levels determine "
-            "the number. Remove it",
+            "the number of cases. Remove it",
             name="[design] cases",
             value=str(kind),
         )

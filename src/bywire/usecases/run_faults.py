@@ -67,7 +67,7 @@ def run_faults(
     Returns
     -------
     FaultCampaign
-        Effect, class, fault tolerant time [s] and detection time [s] of each fault, the diagnostic
+        Effect, class, fault-tolerant time [s] and detection time [s] of each fault, the diagnostic
         coverage, and false alarms.
 
     Raises

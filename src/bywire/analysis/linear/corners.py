@@ -756,7 +756,7 @@ class _Number:
             return self._chain(elementary.cos(a), -elementary.sin(a))
         if name == "arctan":
             return self._chain(float(np.arctan(a)), 1.0 / (1.0 + a * a))
-        raise TypeError(f"ops.{name} has no slope. Define it in _Number._bywire_op")
+        raise TypeError(f"ops.{name} has no derivative. Define it in _Number._bywire_op")
 
 
 class _Choice:

@@ -225,8 +225,8 @@ def _direction(name: str, state: NamedTuple) -> float:
     speed = float(getattr(state, name))
     if speed == 0.0:
         raise ParameterError(
-            f"{name} = 0 is not valid, because friction at rest has no slope. Specify a sliding "
-            "speed, or use friction='removed'",
+            f"{name} = 0 is not valid, because friction at rest has no derivative. Specify a "
+            "sliding speed, or use friction='removed'",
             name=name,
             value="0",
             valid="a sliding speed",

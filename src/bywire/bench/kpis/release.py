@@ -46,7 +46,7 @@ def released(t: Samples, signal: Samples) -> Release | Undefined:
 
 @measure("s")
 def time_to_empty(released: Release, setting: Setting) -> float | Undefined:
-    """Time from the release until the output stays below the level that counts as empty.
+    """Time from the release until the output stays below the level of a released brake.
 
     Interpolated between the last sample above it and the next one.
     """

@@ -65,18 +65,18 @@ class Memory(NamedTuple):
     slip_f_integral: Annotated[float, Signal("Pa", "integral part of the front slip PI", 2e6)]
     slip_r_integral: Annotated[float, Signal("Pa", "integral part of the rear slip PI", 2e6)]
     lift_integral: Annotated[float, Signal("Pa", "integral part of the lift PI", 2e6)]
-    phase_f: Annotated[float, Signal("1", "phase of the front anti-lock rules", 3.0)]
-    phase_r: Annotated[float, Signal("1", "phase of the rear anti-lock rules", 3.0)]
+    phase_f: Annotated[float, Signal("1", "phase of the front rule-based ABS", 3.0)]
+    phase_r: Annotated[float, Signal("1", "phase of the rear rule-based ABS", 3.0)]
     since_f: Annotated[
         float, Signal("s", "time since the last phase or step of the front rules", 0.1)
     ]
     since_r: Annotated[
         float, Signal("s", "time since the last phase or step of the rear rules", 0.1)
     ]
-    p_left_f: Annotated[float, Signal("Pa", "front demand after the anti-lock rules", 2e6)]
-    p_left_r: Annotated[float, Signal("Pa", "rear demand after the anti-lock rules", 2e6)]
-    p_hat_f: Annotated[float, Signal("Pa", "front pressure estimated by the anti-lock rules", 2e6)]
-    p_hat_r: Annotated[float, Signal("Pa", "rear pressure estimated by the anti-lock rules", 2e6)]
+    p_left_f: Annotated[float, Signal("Pa", "front demand after the rule-based ABS", 2e6)]
+    p_left_r: Annotated[float, Signal("Pa", "rear demand after the rule-based ABS", 2e6)]
+    p_hat_f: Annotated[float, Signal("Pa", "front pressure estimated by the rule-based ABS", 2e6)]
+    p_hat_r: Annotated[float, Signal("Pa", "rear pressure estimated by the rule-based ABS", 2e6)]
     p_held_f: Annotated[
         float, Signal("Pa", "last pressure that the road could hold at the front wheel", 2e6)
     ]

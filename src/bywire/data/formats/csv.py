@@ -113,7 +113,7 @@ def _strict_columns(
     Raises
     ------
     FileError
-        For a row with another number of cells, or a cell that is not a number, with line and
+        For a row with a different number of cells, or a cell that is not a number, with line and
         column.
     """
     try:

@@ -179,7 +179,7 @@ class Mdf4Source:
         end = channel.byte_offset + (channel.bit_offset + channel.bit_count + 7) // 8
         if channel.channel_type not in (_VIRTUAL_MASTER, _VIRTUAL) and end > size:
             raise FileError(
-                f"{self._path} is damaged: the channel {quoted(channel.name)} reaches to byte "
+                f"{self._path} is damaged: the channel {quoted(channel.name)} extends to byte "
                 f"{end}, but records have {size} bytes. Copy it again, or repair it with the "
                 "program that recorded it",
                 name=channel.name,

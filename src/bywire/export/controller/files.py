@@ -555,9 +555,9 @@ def _plant(program: Program) -> str:
     if not names:
         return ""
     return (
-        f"{program.name}_io.c contains the plant side of the ticks ({', '.join(names)}): sensors "
-        "and converters as simulated by the bench, and power-stage limits. On a target, the "
-        "hardware replaces this file."
+        f"{program.name}_io.c contains the plant interface of each tick ({', '.join(names)}): "
+        "sensors and converters as simulated by the bench, and power-stage limits. On a target, "
+        "the hardware replaces this file."
     )
 
 

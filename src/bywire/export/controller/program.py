@@ -109,7 +109,7 @@ class Program:
 
     @property
     def plant_functions(self) -> list[CFunction]:
-        """Functions of the plant side of the ticks, declared in a header."""
+        """Functions of the plant interface of each tick, declared in a header."""
         return [each for each in self.functions if each.is_plant and each.module != OPS]
 
     def shown(self) -> list[Struct]:

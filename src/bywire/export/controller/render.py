@@ -1,4 +1,4 @@
-"""C files of an ECU: header, laws, plant side of the ticks, and parameters."""
+"""C files of an ECU: header, laws, plant interface of each tick, and parameters."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def io_header(program: Program) -> str:
     parts = [
         comment(
             [
-                "Plant side of the ticks: converters, sensors and power-stage limits.",
+                "Plant interface of each tick: converters, sensors and power-stage limits.",
                 "On a target, the hardware or its drivers replace these functions.",
             ]
         ),
@@ -145,7 +145,7 @@ def io_source(program: Program) -> str:
     """Return ``NAME_io.c``."""
     name = program.name
     parts = [
-        comment(["Plant side of the ticks."]),
+        comment(["Plant interface of each tick."]),
         f'#include "{name}_io.h"\n#include "{name}_ops.h"',
     ]
     return "\n\n".join([*parts, *(_function(program, f) for f in program.plant_functions)]) + "\n"

@@ -35,7 +35,7 @@ class Options(ParameterSet):
     t_ramp: TimeConstant
     """time for the pressure demand to fall to zero (how = "controlled")"""
     p_empty: Pressure
-    """caliper pressure below which the brake counts as empty"""
+    """caliper pressure below which the brake is considered fully released"""
     duration: Duration
     """recording time after the release begins"""
     settle: TimeConstant

@@ -52,8 +52,8 @@ def fig3(runs: Runs) -> Part:
             "fig3.bandwidth",
             FACTS["fig3_bandwidth"],
             small_signal(MAIN, "locked", "i_meas"),
-            note="-3 dB of the measured current after the 180 Hz filter, small signal, locked "
-            "rotor",
+            note="-3 dB bandwidth of the measured current after the 180 Hz filter, small signal, "
+            "locked rotor",
             tuned="calibrated",
         ),
         compared(
@@ -159,7 +159,8 @@ def fig7(runs: Runs) -> Part:
                 f"fig7.bandwidth{suffix}",
                 FACTS["bandwidth"],
                 _bandwidth(tests[name]),
-                note="-3 dB of the nonlinear closed loop with dither, sines of 1 bar at 25 bar",
+                note="-3 dB bandwidth of the nonlinear closed loop with dither, 1 bar sines at "
+                "25 bar",
             )
         )
         items += _tracking(runs.bench("pedal-tracking", name), suffix)

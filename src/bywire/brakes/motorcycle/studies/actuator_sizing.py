@@ -380,9 +380,9 @@ class Options(ParameterSet):
     ratios: Count
     """number of gear ratios, logarithmically spaced"""
     f_min: Frequency
-    """minimum bandwidth of the map"""
+    """minimum bandwidth in the map"""
     f_max: Frequency
-    """maximum bandwidth of the map"""
+    """maximum bandwidth in the map"""
     frequencies: Count
     """number of bandwidths, logarithmically spaced"""
 
