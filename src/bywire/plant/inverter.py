@@ -37,8 +37,7 @@ class Parameters(ParameterSet):
     V_f: ForwardVoltage
     """forward voltage of switch and diode (law "dead time")"""
     i_th: Current
-    """current at which the distortion reaches its full value; smaller currents recharge the switch
-    capacitances, :math:`2 C_{oss} V_{dc} / t_d` (law "dead time")"""
+    """current of full distortion, 2 C_oss V_dc / t_d of the switches (law "dead time")"""
 
 
 FAULTS = (

@@ -28,8 +28,7 @@ class Parameters(ParameterSet):
     eta_f: Fraction
     """efficiency when the screw drives the load"""
     eta_b: BackEfficiency
-    """efficiency when the load drives the screw; 2 - 1/eta_f makes both losses equal; at 0 or
-    less, the screw locks itself"""
+    """efficiency when the load drives the screw: 2 - 1/eta_f for equal losses, <= 0 if it locks"""
     law: Literal["load", "drive"]
     """quantity to which the loss is proportional: axial force or motor torque"""
 

@@ -23,7 +23,7 @@ NAMES = (
     "stiffness",
     "force-fight",
 )
-WINDINGS, GAINS = ("parallel", "single", "series"), ("low", "nominal", "high")
+WINDINGS, GAINS = ("parallel", "single", "series"), ("soft", "usual", "sharp")
 
 
 @pytest.fixture(scope="module")
@@ -134,21 +134,21 @@ def test_current_loop_bandwidth_follows_gain_over_winding(results):
     found = values(results["current-loop"])
     bandwidth = {(w, g): found[f"bandwidth_{w}_{g}"] for w in WINDINGS for g in GAINS}
     for (w, g), (other_w, other_g) in (
-        (("parallel", "nominal"), ("single", "high")),
-        (("parallel", "low"), ("series", "high")),
-        (("single", "low"), ("series", "nominal")),
+        (("parallel", "usual"), ("single", "sharp")),
+        (("parallel", "soft"), ("series", "sharp")),
+        (("single", "soft"), ("series", "usual")),
     ):
         assert bandwidth[w, g] == pytest.approx(bandwidth[other_w, other_g], rel=1e-3)
     # Far below the filters' corners the loop is the pole that its gains were chosen for.
-    assert bandwidth["series", "low"] == pytest.approx(150.0, rel=0.02)
-    assert bandwidth["parallel", "nominal"] < 1200.0
+    assert bandwidth["series", "soft"] == pytest.approx(150.0, rel=0.02)
+    assert bandwidth["parallel", "usual"] < 1200.0
 
 
 def test_fast_filters_leave_the_first_order_loop():
     fast = {"drive.f_demand": 1e5, "drive.f_sense": 1e5}
     bench = bywire.Bench("current-loop", "roberts2003", fast, step=2e-6, record=4e-6)
     found = values(run_once(bench))
-    for share, winding, gain in ((0.5, "parallel", "low"), (0.25, "series", "nominal")):
+    for share, winding, gain in ((0.5, "parallel", "soft"), (0.25, "series", "usual")):
         assert found[f"bandwidth_{winding}_{gain}"] == pytest.approx(1200.0 * share, rel=0.02)
 
 

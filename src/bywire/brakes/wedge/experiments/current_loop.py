@@ -21,7 +21,7 @@ from bywire.core.quantities import Current, Duration, Unit
 _Shares = tuple[Annotated[float, Field(gt=0, allow_inf_nan=False)], ...]
 ThreeFactors = Annotated[_Shares, Unit("1", 2.0), Field(min_length=3, max_length=3)]
 
-_WINDINGS, _GAINS = ("parallel", "single", "series"), ("low", "nominal", "high")
+_WINDINGS, _GAINS = ("parallel", "single", "series"), ("soft", "usual", "sharp")
 _FIGURES = ("rise_time", "overshoot", "settling_time")  # of the step response
 _LABELS = tuple(f"{winding}_{gain}" for winding in _WINDINGS for gain in _GAINS)
 LAG = Figures(bandwidth=("Hz", "Corner frequency of a first-order lag with this rise time."))
@@ -39,7 +39,7 @@ class Options(ParameterSet):
     windings: ThreeFactors
     """resistance and inductance relative to the parameter set: parallel, single, series"""
     gains: ThreeFactors
-    """current controller gains relative to the parameter set: low, nominal, high"""
+    """current controller gains relative to the parameter set: soft, usual, sharp"""
     duration: Duration
     """recording time after the step"""
     record: Duration

@@ -23,13 +23,13 @@ def current_loop(runs: Runs) -> Part:
     result = runs.bench("current-loop", MAIN)
     values = kpis(result)
     bandwidths = [value for name, value in values.items() if name.startswith("bandwidth")]
-    nominal, position = values["bandwidth_parallel_nominal"], parameters().control.position.f_n
+    usual, position = values["bandwidth_parallel_usual"], parameters().control.position.f_n
     items = [
         compared(
             "current_loop.bandwidth",
             FACTS["fast_current"],
-            nominal / position,
-            note=f"{nominal:.0f} Hz compared with {position:g} Hz of the high-bandwidth position "
+            usual / position,
+            note=f"{usual:.0f} Hz compared with {position:g} Hz of the high-bandwidth position "
             "control. We chose both",
         ),
         found(
