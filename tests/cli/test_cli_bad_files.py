@@ -41,7 +41,7 @@ def test_endless_file(bywire):
 def test_ten_megabytes(bywire, bench):
     path = bench(BRAKING + "# padding\n" * 1_000_000)
     started = time.process_time()
-    refused(bywire("run", path), "more than 1000 kB", "options.trace")
+    refused(bywire("run", path), "larger than 1000 kB", "options.trace")
     assert time.process_time() - started < 2.0
 
 

@@ -141,7 +141,7 @@ def test_of_two_columns_that_may_drive_the_first_is_suggested(
     path = tmp_path / "rig.csv"
     path.write_text("\n".join(["t [s],Soll [bar],Haupt [bar]", *rows, ""]))
     outcome = bywire("replay", path, "--bench", "hard-braking")
-    refused(outcome, "Type for example --input p_set=Soll. Haupt would also fit. ")
+    refused(outcome, "For example, type --input p_set=Soll. Haupt would also fit. ")
 
 
 def test_an_unknown_output_names_those_of_its_unit_first_and_the_whole_list(

@@ -192,7 +192,7 @@ class _Rubbing(MaxwellSlip):
         (_Wrong(), "the rate of z_2 depends on a stop operator"),
         (
             _OneWidth(),
-            r"widths returns 1 values, but must return 4 \(one width per stop operator\)",
+            r"widths returns 1 value, but must return 4 \(one width per stop operator\)",
         ),
         (_Rubbing(), "stops lists 'z_2', which is also one of frictions"),
     ],

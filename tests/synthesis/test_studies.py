@@ -228,7 +228,7 @@ def test_a_map_without_numbers_is_refused_and_marks_outside_are_left_out() -> No
     data = actuator_sizing.compute(MOTORCYCLE, options, silent).data
     shown = Map("electrical", "k_g", "frequency", "", (Mark("far away", 1.0, 10.0),))
     assert contour(data, shown).axes[0].get_legend() is None
-    with pytest.raises(ParameterError, match="no number"):
+    with pytest.raises(ParameterError, match="no finite value"):
         contour(data.assign(electrical=data["electrical"] * np.nan), shown)
 
 
