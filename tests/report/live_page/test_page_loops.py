@@ -38,7 +38,7 @@ BENCH_OF = {
 
 def case_of(name):
     """Return the run with the values of the bench if there are several."""
-    return "parallel_nominal" if name == "drive-current" else ""
+    return "parallel_usual" if name == "drive-current" else ""
 
 
 @needs_node
