@@ -33,11 +33,15 @@ class TruckEbs(Corner[Par, ecu.Memory]):
     frictions: ClassVar[tuple[str, ...]] = ("v", "omega")
     shared: ClassVar[tuple[str, ...]] = ("gas",)
 
-    E_source = Integral("J", "exergy of the fed air", role=Role("source", "reservoir"))
-    E_exhaust = Integral("J", "exergy of the exhausted air", role=Role("sink", "exhausted air"))
+    E_source = Integral("J", "energy of the fed air", role=Role("source", "reservoir"))
+    E_exhaust = Integral("J", "energy of the exhausted air", role=Role("sink", "exhausted air"))
+    E_throttling = Integral("J", "throttling in both seats", role=Role("sink", "throttling"))
+    E_walls = Integral(
+        "J", "heat to the walls, work on ambient air", role=Role("sink", "walls", returns="any")
+    )
     relay = Part(relay_valve, state={"s": "spool"}, output=("feed", "exhaust"))
-    feed = Part(air_orifice, loss="E_feed")
-    outlet = Part(air_orifice, par="exhaust", loss="E_outlet", which="outlet")
+    feed = Part(air_orifice)
+    outlet = Part(air_orifice, par="exhaust")
     volume = Part(air_volume)
     chamber = Part(brake_chamber)
     rod = Part(push_rod, loss="E_rod")
@@ -98,13 +102,9 @@ class TruckEbs(Corner[Par, ecu.Memory]):
 
     def power(self, w: Self) -> dict[str, float]:
         """Return the powers that do not follow from the parts."""
-        gas = w.par.gas
-        into = air_orifice.output(w.feed.u, w.feed.par, gas).mdot
-        out = air_orifice.output(w.outlet.u, w.outlet.par, gas).mdot
         return {
             **super().power(w),
-            "E_source": into * air.exergy(w.feed.u.p_a, gas),
-            "E_exhaust": out * air.exergy(w.outlet.u.p_b, gas),
+            **_air_powers(w),
             "E_friction": -w.reaction[0] * w.rod.x.v,
             "E_brake": -w.reaction[1] * w.turning.x.omega,
         }
@@ -125,6 +125,29 @@ class TruckEbs(Corner[Par, ecu.Memory]):
     def rest(self, par: Par) -> tuple[Any, ecu.Memory]:
         """Return the vehicle at rest with released brakes."""
         return rolling(par, 0.0)
+
+
+def _air_powers(w: TruckEbs) -> dict[str, float]:
+    """Return the powers of the air: exergies of isothermal air, else enthalpies and heat."""
+    gas, volume = w.par.gas, w.volume
+    into = air_orifice.output(w.feed.u, w.feed.par, gas)
+    out = air_orifice.output(w.outlet.u, w.outlet.par, gas)
+    if volume.par.law == "isothermal":
+        lost = air_orifice.power_loss(w.feed.u, w.feed.par, gas)
+        lost = lost + air_orifice.power_loss(w.outlet.u, w.outlet.par, gas)
+        return {
+            "E_source": into.mdot * air.exergy(w.feed.u.p_a, gas),
+            "E_exhaust": out.mdot * air.exergy(w.outlet.u.p_b, gas),
+            "E_throttling": lost,
+            "E_walls": 0.0 * lost,
+        }
+    heat = volume.par.G_w * (volume.x.T - gas.T_0)
+    return {
+        "E_source": into.H,
+        "E_exhaust": out.H,
+        "E_throttling": 0.0 * heat,
+        "E_walls": heat + gas.p_atm * volume.u.V_rate,
+    }
 
 
 def rolling(par: Par, v: float) -> tuple[Any, ecu.Memory]:
