@@ -96,3 +96,9 @@ def test_the_kinetic_energy_goes_to_brake_and_tire():
 
 def test_every_contract_holds():
     assert bywire.check("truck-ebs").holds
+
+
+def test_a_pilot_valve_that_sticks_open_is_not_detected():
+    outcome = bywire.run_faults("truck-ebs").tables()["Faults"].set_index("fault")
+    assert outcome.loc["pilot.stuck 0 bar", "class"] == "undetected"
+    assert outcome.loc["ecu.dead", "class"] == "covered"
