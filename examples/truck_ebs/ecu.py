@@ -24,7 +24,7 @@ class Memory(NamedTuple):
 
 
 def tick(x: Any, m: Memory, u: Stimulus, par: Any) -> Memory:
-    """Sample the demand; the pilot valve follows it with a lag, sampled exactly."""
+    """Sample the demand; the pilot valve follows it with a lag, by backward Euler."""
     p_ref = ops.clip(u.p_set, 0.0, par.ecu.p_max)
     share = par.ecu.T_s / (par.ecu.T_s + par.ecu.T_bus)
     return Memory(p_ref=p_ref, p_control=m.p_control + share * (p_ref - m.p_control))

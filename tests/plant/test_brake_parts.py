@@ -90,6 +90,15 @@ def test_an_accumulator_stores_the_energy_of_its_spring():
     assert pytest.approx(1.5 * BAR * 2e-6 + 0.5 * par.k * 4e-12, rel=1e-6) == W
 
 
+def test_an_accumulator_reports_that_it_is_full():
+    par = accumulator.Parameters.create({"p_0": 1.5 * BAR, "k": BAR / 1e-6, "V_max": 3.5e-6})
+    t = np.array([0.0, 0.1, 0.2])
+    texts = accumulator.watch(t, accumulator.State(np.array([1e-6, 3.6e-6, 2e-6])), par)
+    assert len(texts) == 1
+    assert "0.1 s" in texts[0]
+    assert accumulator.watch(t, accumulator.State(np.full(3, 3.4e-6)), par) == []
+
+
 @pytest.mark.parametrize(("x", "F", "W"), [(0.010, 200.0, 0.680), (0.014, 408.0, 1.896)])
 def test_a_pedal_simulator_stiffens(x, F, W):
     values = {"k_1": 12e3, "k_2": 40e3, "x_1": 8e-3, "d_in": 200.0, "d_out": 400.0}

@@ -92,6 +92,15 @@ def test_brake_factors_over_friction():
     assert drum.brake_factors(shoes(law="servo"))[0] > 2 * leading
 
 
+def test_shoes_in_series_balance_their_moments():
+    par, F = shoes(law="servo"), 1000.0
+    M = drum.moments(par)
+    first = F * par.c / (M.normal - par.mu * M.friction) * par.mu * M.torque
+    pushed = (F * (par.c - par.a) + first) / par.a  # moments of the floating shoe about the center
+    second = pushed * 2 * par.a / (M.normal - par.mu * M.friction) * par.mu * M.torque
+    assert drum.output(drum.Input(F, 1.0), par).T_p == pytest.approx(first + second)
+
+
 def test_moments_and_torque_agree_with_numerical_integrals():
     par, n = shoes(theta_1=0.2, theta_2=1.2), 20001
     angle = np.linspace(par.theta_1, par.theta_2, n)

@@ -10,12 +10,18 @@ from pydantic import Field
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Current, Fraction, Inductance, Resistance, Unit
+from bywire.core.quantities import (
+    Current,
+    FluxLinkage,
+    Fraction,
+    Inductance,
+    PolePairs,
+    Resistance,
+    Unit,
+)
 from bywire.core.signals import Signal
 
 Bandwidth = Annotated[float, Unit("rad/s", 3e3), Field(gt=0, allow_inf_nan=False)]
-FluxLinkage = Annotated[float, Unit("V*s", 6e-3), Field(gt=0, allow_inf_nan=False)]
-PolePairs = Annotated[float, Unit("1", 4.0), Field(ge=1, le=50, allow_inf_nan=False)]
 WeakeningGain = Annotated[float, Unit("A/(V*s)", 1e3), Field(ge=0, allow_inf_nan=False)]
 LeadTicks = Annotated[float, Unit("1", 1.5), Field(ge=0, le=5, allow_inf_nan=False)]
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-4), Gt(0)]

@@ -104,6 +104,8 @@ Current = Annotated[float, Unit("A", 10.0), _POSITIVE]
 SignedCurrent = Annotated[float, Unit("A", 10.0), _FINITE]
 CurrentRate = Annotated[float, Unit("A/s", 0.2), _POSITIVE]
 TorqueConstant = Annotated[float, Unit("N*m/A", 0.03), _POSITIVE]
+FluxLinkage = Annotated[float, Unit("V*s", 6e-3), _POSITIVE]
+PolePairs = Annotated[float, Unit("1", 4.0), Field(ge=1, le=50, allow_inf_nan=False)]
 
 # Mechanical
 Mass = Annotated[float, Unit("kg", 0.01), _POSITIVE]

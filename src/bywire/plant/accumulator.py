@@ -10,6 +10,8 @@ from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Pressure, Unit
 from bywire.core.signals import Energy, Power, Signal
+from bywire.core.typing import Array
+from bywire.core.validity import first, row_by_row
 from bywire.plant import brake_fluid
 
 Stiffness = Annotated[float, Unit("Pa/m**3", 1e11), Field(gt=0, allow_inf_nan=False)]
@@ -72,3 +74,9 @@ def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
 def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
     """Return the power of the inflow."""
     return brake_fluid.convected_power(u.q, pressure(x, par), fluid)
+
+
+@row_by_row
+def watch(t: Array, x: State, par: Parameters) -> list[str]:
+    """Warn if the volume exceeds that of the full accumulator."""
+    return first(t, par.V_max < x.V, "the accumulator is full (V_max)")

@@ -8,11 +8,9 @@ from pydantic import Field
 
 from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Inductance, Resistance, Unit
+from bywire.core.quantities import FluxLinkage, Inductance, PolePairs, Resistance, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
 
-PolePairs = Annotated[float, Unit("1", 4.0), Field(ge=1, le=50, allow_inf_nan=False)]
-FluxLinkage = Annotated[float, Unit("V*s", 6e-3), Field(gt=0, allow_inf_nan=False)]
 Hysteresis = Annotated[float, Unit("W/(V**2*s)", 10.0), Field(ge=0, allow_inf_nan=False)]
 Eddy = Annotated[float, Unit("W/V**2", 1e-3), Field(ge=0, allow_inf_nan=False)]
 MotorSpeed = Annotated[float, Signal("rad/s", "motor speed", 100.0)]
