@@ -60,9 +60,15 @@ def maxwell_slip(
                 full.terminal, full.direction = True, 1.0  # type: ignore[attr-defined]
                 events.append(full)
             part = solve_ivp(
-                rates, (t, end), y, "DOP853", events=events, rtol=1e-12, atol=1e-15,
+                rates,
+                (t, end),
+                y,
+                "DOP853",
+                events=events,
+                rtol=1e-12,
+                atol=1e-15,
                 max_step=par.T_s / 50,
-            )  # fmt: skip
+            )
             t, y = part.t[-1], part.y[:, -1]
             if part.t_events[0].size:
                 y[1], direction = 0.0, -direction

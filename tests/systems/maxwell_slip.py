@@ -196,11 +196,20 @@ class MaxwellSlip(Model):
 
 
 PARAMETERS = Parameters(
-    m=2.0, k=2e6, F_c=40.0, F_load=300.0,
-    k_1=4e6, k_2=3e6, k_3=2e6, k_4=1e6,
-    W_1=50.0, W_2=150.0, W_3=300.0, W_4=400.0,
+    m=2.0,
+    k=2e6,
+    F_c=40.0,
+    F_load=300.0,
+    k_1=4e6,
+    k_2=3e6,
+    k_3=2e6,
+    k_4=1e6,
+    W_1=50.0,
+    W_2=150.0,
+    W_3=300.0,
+    W_4=400.0,
     T_s=1e-3,
-)  # fmt: skip
+)
 """the four springs of the specification; elastic spring and mass at choice"""
 AMPLITUDE = 1e-4
 

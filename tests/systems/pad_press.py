@@ -129,10 +129,16 @@ class TwoParameters(ParameterSet):
 
 PADS = pad_hysteresis.Parameters(
     law="constant",
-    k_1=4e6, k_2=3e6, k_3=2e6, k_4=1e6,
-    W_1=50.0, W_2=150.0, W_3=300.0, W_4=400.0,
+    k_1=4e6,
+    k_2=3e6,
+    k_3=2e6,
+    k_4=1e6,
+    W_1=50.0,
+    W_2=150.0,
+    W_3=300.0,
+    W_4=400.0,
     F_ref=2e3,
-)  # fmt: skip
+)
 PAR = Parameters(
     shaft=shaft.Parameters(J=2e-4, d=1e-4),
     pads=PADS,
