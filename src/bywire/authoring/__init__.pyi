@@ -105,6 +105,7 @@ from bywire.core.signals import Power as Power
 from bywire.core.signals import Role as Role
 from bywire.core.signals import Signal as Signal
 from bywire.core.signals import Speed as Speed
+from bywire.core.signals import joined as joined
 from bywire.core.signals import zeros as zeros
 from bywire.core.typing import Array as Array
 from bywire.core.typing import Progress as Progress
