@@ -48,7 +48,7 @@ def released(t: Samples, signal: Samples) -> Release | Undefined:
 def time_to_empty(released: Release, setting: Setting) -> float | Undefined:
     """Time from the release until the output stays below the level of a released brake.
 
-    Interpolated between the last sample above it and the next one.
+    Interpolated between the last sample above this level and the next sample.
     """
     t = released.t
     y = released.y
