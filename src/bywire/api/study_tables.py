@@ -414,7 +414,7 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
             ". Extend the study" if outcome == "undecided" else ""
         )
     if failure.state == "level":
-        return "too many cases have the same figure to rank them. Use 'monte-carlo'"
+        return "too many cases have the same key figure to rank them. Use 'monte-carlo'"
     if failure.state == "no design point":
         return f"bywire found no design point, because {failure.why}. Use 'subset-simulation'"
     return ""

@@ -213,6 +213,6 @@ def far_from_peak(
         texts[
             f"slip control uses a slip set point of {slip_set:.3g} ({parameter}), but {surface} "
             f"has its maximum adhesion at {peak:.3g}. The wheel uses {100.0 * held / most:.0f} % "
-            "of it. A larger set point, or rules (abs=rules), would brake harder there"
+            "of it. A larger set point, or the rule-based ABS (abs=rules), would brake harder there"
         ] = None
     return list(texts)

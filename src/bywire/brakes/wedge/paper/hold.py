@@ -102,7 +102,7 @@ def _standing(runs: Runs) -> list[Item]:
             "hold.standing.stick",
             "1",
             shares["stick"],
-            "the same ratio if the pad sticks to the stopped disc (our other reading)",
+            "the same ratio if the pad sticks to the stopped disc (our other interpretation)",
         ),
         found(
             "hold.force_held",

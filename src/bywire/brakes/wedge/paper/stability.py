@@ -93,7 +93,7 @@ def _static(runs: Runs) -> list[Item]:
                 ALLOWANCES["formula"],
                 f"mu_B = {mu_B:g}, simulated "
                 f"without friction, F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 "
-                f"Nm. With friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
+                f"N·m. With friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
                 f"rising, {values[f'C_star_falling_{tag(mu_B)}']:.3g} falling",
             )
         )
