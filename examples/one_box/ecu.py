@@ -63,24 +63,25 @@ def demand_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
 
 def pressure_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
     """Run pressure control of the plunger once."""
-    state, out = plunger_pressure.output(
-        plunger_pressure.State(m.theta_ref),
-        plunger_pressure.Input(m.p_ref, r.p, r.theta),
-        par.ecu.T_s,
-        par.ecu.pressure,
-    )
-    return m._replace(theta_ref=state.theta_ref, omega_ref=out.omega)
+    reference = plunger_pressure.State(m.theta_ref)
+    seen = plunger_pressure.Input(m.p_ref, r.p)
+    return m._replace(omega_ref=plunger_pressure.output(reference, seen, par.ecu.pressure))
 
 
 def position_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
-    """Run position control once."""
-    law = par.ecu.position
+    """Move the reference of the motor angle, and run position control once."""
+    T, law = par.ecu.T_position, par.ecu.position
     if par.drive == "position":
         m = m._replace(theta_ref=u.theta_set)
+    else:
+        reference = plunger_pressure.State(m.theta_ref)
+        law_p = par.ecu.pressure
+        moved = plunger_pressure.advanced(reference, m.omega_ref, r.theta, T, law_p)
+        m = m._replace(theta_ref=moved.theta_ref)
     state, out = position_pd.output(
         position_pd.State(m.theta_last, m.omega_meas),
         position_pd.Input(m.theta_ref, m.omega_ref, r.theta),
-        par.ecu.T_position,
+        T,
         law,
     )
     saturated = ops.where(ops.fabs(out.i) >= law.i_max, 1.0, 0.0)

@@ -67,6 +67,8 @@ class Hydraulics(Assembly[ParT, MemoryT]):
     caliper = Part(stiffening_caliper)
     store = Part(accumulator, par="accumulator", state={"V": "V_acc"})
     V_given = Integral("m**3", "volume from the reservoir")
+    V_released = Integral("m**3", "volume released into the accumulator")
+    V_pumped = Integral("m**3", "volume returned by the pump")
     V_squeezed = Integral("m**3", "compression of the fluid in the plunger's chamber")
 
     voltage = Wire("V", "motor voltage", 5.0)
@@ -76,6 +78,7 @@ class Hydraulics(Assembly[ParT, MemoryT]):
     q_in = Wire("m**3/s", "flow into the wheel", 1e-5)
     q_out = Wire("m**3/s", "flow out of the wheel", 1e-5)
     x_foot = Shown("m", "pedal travel", 0.05)
+    q_pump = Wire("m**3/s", "flow of the return pump", 3e-6)
     V_missing = Shown("m**3", "residual of the volume balance", 1e-9)
 
     def wire(self, w: Any) -> None:
@@ -104,6 +107,8 @@ class Hydraulics(Assembly[ParT, MemoryT]):
             "E_friction": -w.reaction[0] * w.gear.x.omega,
             "E_port": lost - brake_fluid.convected_power(makeup, p, fluid),
             "V_given": makeup - leak,
+            "V_released": w.q_out,
+            "V_pumped": w.q_pump,
             "V_squeezed": chamber * w.rate.p_mc,
         }
 
@@ -160,11 +165,12 @@ def _hydraulics(w: Any) -> None:
     w.q_out = solenoid_valve.flow(w.outlet.x, w.outlet.u, w.outlet.par, fluid)
     w.others.u = stiffening_caliper.Input(to_others)
     w.caliper.u = stiffening_caliper.Input(w.q_in - w.q_out)
-    w.store.u = accumulator.Input(w.q_out)
+    w.q_pump = 3.3e-6 * w.store.x.V / (w.store.x.V + 5e-8)
+    w.store.u = accumulator.Input(w.q_out - w.q_pump)
     piston = ball_screw_gear.output(w.gear.x, w.gear.par)
     w.port.u = reservoir_port.Input(piston.x - w.chamber.par.x_rest, p)
     leak = reservoir_port.output(w.port.u, w.port.par).G * p
-    w.chamber.u = master_cylinder.Input(piston.x, piston.v, to_others + w.q_in + leak)
+    w.chamber.u = master_cylinder.Input(piston.x, piston.v, to_others + w.q_in + leak - w.q_pump)
 
 
 def _drive(w: Any) -> None:

@@ -17,6 +17,7 @@ MotorAngle = Annotated[float, Unit("rad", 1.0), Field(gt=0, allow_inf_nan=False)
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 GaugePressure = Annotated[float, Signal("Pa", "pressure", 2e6)]
 Angle = Annotated[float, Signal("rad", "motor angle", 10.0)]
+Speed = Annotated[float, Signal("rad/s", "speed of the reference", 50.0)]
 
 
 class Parameters(ParameterSet):
@@ -53,33 +54,28 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Pressure demand and measurements."""
+    """Pressure demand and measured pressure."""
 
     p_ref: GaugePressure
     p: GaugePressure
-    theta: Angle
 
 
-class Output(NamedTuple):
-    """Speed of the reference."""
-
-    omega: Annotated[float, Signal("rad/s", "speed of the reference", 50.0)]
-
-
-def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
-    r"""Advance the controller by one sample.
+def output(x: State, u: Input, par: Parameters) -> Speed:
+    r"""Return the speed of the reference.
 
     .. math:: \omega = \omega_c \frac{\hat C(p)}{\hat k \hat A} (p_{ref} - p), \quad
         \hat C(p) = \frac{dV}{dp}
 
-    within the limits of speed and travel. Below ``p_on``, the reference returns to the rest angle
-    with the same crossover frequency.
+    Below ``p_on``, the reference returns to the rest angle with the same crossover frequency.
     """
     C = stiffening_caliper.mass(stiffening_caliper.State(ops.fmax(u.p, 0.0)), par.brakes)
     pressing = par.omega_c * C / (par.k_hat * par.A_hat) * (u.p_ref - u.p)
     parking = par.omega_c * (par.theta_rest - x.theta_ref)
     wanted = ops.where(u.p_ref < par.p_on, parking, pressing)
-    omega = ops.clip(wanted, -par.omega_max, par.omega_max)
-    near = ops.clip(x.theta_ref + T * omega, u.theta - par.lead, u.theta + par.lead)
-    theta_ref = ops.clip(near, par.theta_rest, par.theta_end)
-    return State(theta_ref), Output((theta_ref - x.theta_ref) / T)
+    return ops.clip(wanted, -par.omega_max, par.omega_max)
+
+
+def advanced(x: State, omega: Speed, theta: Angle, T: SampleTime, par: Parameters) -> State:
+    """Return the reference after a sample, near the measured angle and within the travel."""
+    near = ops.clip(x.theta_ref + T * omega, theta - par.lead, theta + par.lead)
+    return State(ops.clip(near, par.theta_rest, par.theta_end))

@@ -102,7 +102,7 @@ NUMBERS = {
     "accumulator.k": chosen(1 * BAR / CM3, _NONE),
     "accumulator.V_max": chosen(3.5 * CM3, _NONE),
     "ecu.T_s": chosen(1e-3, "a tenth of the loop"),
-    "ecu.T_position": chosen(0.5e-3, "short compared with the loop"),
+    "ecu.T_position": chosen(1e-3, "short compared with the loop"),
     "ecu.T_current": chosen(0.2e-3, "short compared with the winding"),
     "ecu.T_coil": derived(lambda par: par.ecu.T_s, "the valves are commanded as often"),
     "ecu.V_ref": chosen(5.0, "usual supply of sensors"),
@@ -132,10 +132,11 @@ NUMBERS = {
     "ecu.position.J_hat": derived(lambda par: par.gear.J_mot, _ASSUMED),
     "ecu.position.K_hat": derived(lambda par: par.motor.K_e, _ASSUMED),
     "ecu.current.k_p": derived(
-        lambda par: 1500.0 * par.motor.L_m / par.supply.V_bat, "crossover at 1500 rad/s"
+        lambda par: 2200.0 * par.motor.L_m / par.supply.V_bat, "crossover near 2200 rad/s"
     ),
     "ecu.current.k_i": derived(
-        lambda par: 1500.0 * par.motor.R_m / par.supply.V_bat, "cancels the pole of the winding"
+        lambda par: 4.0 * 2200.0 * par.motor.R_m / par.supply.V_bat,
+        "faster than the winding, because the back-EMF counteracts the current",
     ),
     "ecu.current.T_t": derived(lambda par: par.motor.L_m / par.motor.R_m, "integral time"),
     "ecu.current.D_max": chosen(0.95, "same as the bridge"),

@@ -9,6 +9,7 @@ from bywire.vehicle.corner import (
     rolling_states,
     warm_disc,
 )
+from bywire.vehicle.ideal_stop import ideal_corner_distance
 from bywire.vehicle.two_wheeler import (
     HotBrakes,
     TwoWheeler,
@@ -27,6 +28,7 @@ __all__ = [
     "VehicleParameters",
     "WheelSpeed",
     "cold_start",
+    "ideal_corner_distance",
     "rolling_start",
     "rolling_states",
     "warm_disc",
