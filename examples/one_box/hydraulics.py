@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar, TypeVar
 
 from bywire.authoring import Assembly, Bounds, Integral, Part, Role, Shown, Task, Wire
+from bywire.core import ops
 from bywire.plant import (
     accumulator,
     ball_screw_gear,
@@ -19,7 +20,9 @@ from bywire.plant import (
     orifice,
     pedal_simulator,
     reservoir_port,
+    return_pump,
     seal_friction,
+    shaft,
     solenoid_valve,
     stiffening_caliper,
 )
@@ -65,6 +68,9 @@ class Hydraulics(Assembly[ParT, MemoryT]):
     check = Part(check_valve, loss="E_check")
     outlet = Part(solenoid_valve, suffix="_out", which="outlet valve", loss="E_outlet")
     caliper = Part(stiffening_caliper)
+    pump = Part(return_pump, state={"V": "V_pump"}, loss="E_pump")
+    pump_motor = Part(dc_motor, suffix="_p", which="pump motor", loss="E_copper_p")
+    pump_shaft = Part(shaft, suffix="_p", which="pump", loss="E_viscous_p")
     store = Part(accumulator, par="accumulator", state={"V": "V_acc"})
     V_given = Integral("m**3", "volume from the reservoir")
     V_released = Integral("m**3", "volume released into the accumulator")
@@ -74,11 +80,13 @@ class Hydraulics(Assembly[ParT, MemoryT]):
     voltage = Wire("V", "motor voltage", 5.0)
     i_dc = Wire("A", "battery current", 20.0)
     torque = Wire("N*m", "motor torque", 2.0)
+    T_pump = Wire("N*m", "load of the return pump", 0.1)
     load = Wire("N", "load on the plunger", 2e3)
     q_in = Wire("m**3/s", "flow into the wheel", 1e-5)
     q_out = Wire("m**3/s", "flow out of the wheel", 1e-5)
     x_foot = Shown("m", "pedal travel", 0.05)
-    q_pump = Wire("m**3/s", "flow of the return pump", 3e-6)
+    q_pump = Wire("m**3/s", "flow out of the return pump", 3e-6)
+    q_suck = Wire("m**3/s", "flow into the return pump", 3e-6)
     V_missing = Shown("m**3", "residual of the volume balance", 1e-9)
 
     def wire(self, w: Any) -> None:
@@ -154,7 +162,10 @@ def _pedal(w: Any) -> None:
 def _hydraulics(w: Any) -> None:
     """Connect plunger, valves, calipers and accumulator."""
     fluid, p, p_w = w.par.fluid, w.chamber.x.p, w.caliper.x.p
-    p_acc = accumulator.pressure(w.store.x, w.store.par)
+    p_acc = accumulator.pressure(w.store.x, w.store.par, fluid)
+    w.pump.u = return_pump.Input(w.pump_shaft.x.theta, w.pump_shaft.x.omega, p_acc, p)
+    pump = return_pump.output(w.pump.x, w.pump.u, w.pump.par, fluid)
+    w.q_suck, w.q_pump, w.T_pump = pump.q_s, pump.q_d, pump.torque
     w.line.u = orifice.Input(p, w.others.x.p, 1.0)
     w.inlet.u = solenoid_valve.Input(w.m.close_on, p, p_w)
     w.check.u = check_valve.Input(p_w, p)
@@ -165,8 +176,7 @@ def _hydraulics(w: Any) -> None:
     w.q_out = solenoid_valve.flow(w.outlet.x, w.outlet.u, w.outlet.par, fluid)
     w.others.u = stiffening_caliper.Input(to_others)
     w.caliper.u = stiffening_caliper.Input(w.q_in - w.q_out)
-    w.q_pump = 3.3e-6 * w.store.x.V / (w.store.x.V + 5e-8)
-    w.store.u = accumulator.Input(w.q_out - w.q_pump)
+    w.store.u = accumulator.Input(w.q_out - w.q_suck)
     piston = ball_screw_gear.output(w.gear.x, w.gear.par)
     w.port.u = reservoir_port.Input(piston.x - w.chamber.par.x_rest, p)
     leak = reservoir_port.output(w.port.u, w.port.par).G * p
@@ -174,17 +184,20 @@ def _hydraulics(w: Any) -> None:
 
 
 def _drive(w: Any) -> None:
-    """Connect battery, bridge, motor, screw and plunger."""
+    """Connect battery, bridge, motor, screw and plunger, and the relay and motor of the pump."""
     piston = ball_screw_gear.output(w.gear.x, w.gear.par)
     ends = w.chamber.par
     w.stop.u = end_stop.Input(piston.x, piston.v, ends.x_rest, ends.x_end)
     i, duty = w.motor.x.i, w.m.duty
-    w.i_dc = duty * i
+    w.i_dc = duty * i + w.m.pump * w.pump_motor.x.i
     w.supply.u = battery_supply.Input(w.i_dc)
     bus = battery_supply.output(w.supply.u, w.supply.par).v_bus
     w.voltage = h_bridge.output(h_bridge.Input(duty, bus, i)).v
     w.motor.u = dc_motor.Input(w.voltage, w.gear.x.omega)
     w.torque = dc_motor.output(w.motor.x, w.motor.par).torque
+    w.pump_motor.u = dc_motor.Input(w.m.pump * bus, w.pump_shaft.x.omega)
+    driven = dc_motor.output(w.pump_motor.x, w.pump_motor.par).torque
+    w.pump_shaft.u = shaft.Input(driven - w.T_pump, 0.0)
     force = master_cylinder.output(w.chamber.x, w.chamber.u, w.chamber.par).force
     w.load = force + end_stop.load(w.stop.f)
     w.gear.u = ball_screw_gear.Input(w.torque, w.load, 0.0)
@@ -198,7 +211,8 @@ def _missing(w: Any) -> float:
     given = cylinder.A_mc * w.gear.par.k_g * (w.gear.x.theta - start) + w.flow.V_given
     wheel = stiffening_caliper.volume(w.caliper.x, w.caliper.par)
     others = stiffening_caliper.volume(w.others.x, w.others.par)
-    return given - wheel - others - w.store.x.V - w.flow.V_squeezed
+    pumped = w.pump.x.V - filled_pump(w.par).V
+    return given - wheel - others - w.store.x.V - pumped - w.flow.V_squeezed
 
 
 def _reading(law: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
@@ -210,11 +224,18 @@ def _reading(law: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
     return tick
 
 
+def filled_pump(par: OneBoxParameters) -> return_pump.State:
+    """Return the state of a pump without void at a shaft angle of zero."""
+    pump = par.pump
+    return return_pump.State(return_pump.area(pump) * pump.e * ops.cos(pump.phase))
+
+
 def released_parts(par: OneBoxParameters) -> dict[str, Any]:
     """Return the states of the parts of a released brake. The plunger is parked near its stop."""
     return {
         "rod": pedal_rod.State(-par.rod.F_0 / par.pedal_stop.k_stop, 0.0),
         "gear": ball_screw_gear.State(par.ecu.pressure.theta_rest, 0.0),
+        "pump": filled_pump(par),
         "inlet": solenoid_valve.State(solenoid_valve.lift(0.0, par.inlet)),
         "outlet": solenoid_valve.State(solenoid_valve.lift(0.0, par.outlet)),
     }

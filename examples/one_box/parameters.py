@@ -19,7 +19,9 @@ from bywire.plant import (
     orifice,
     pedal_simulator,
     reservoir_port,
+    return_pump,
     seal_friction,
+    shaft,
     solenoid_valve,
     stiffening_caliper,
 )
@@ -75,5 +77,8 @@ class OneBoxParameters(ParameterSet):
     check: check_valve.Parameters
     outlet: solenoid_valve.Parameters
     caliper: stiffening_caliper.Parameters
+    pump: return_pump.Parameters
+    pump_motor: dc_motor.Parameters
+    pump_shaft: shaft.Parameters
     accumulator: accumulator.Parameters
     ecu: EcuParameters

@@ -18,12 +18,12 @@ _ROAD = "dry asphalt, Burckhardt's values for a car tire"
 _STRETCH = {"c1": 1.2801, "c2": 23.99, "c3": 0.52, "B": 9.121, "C": 1.841, "D": 1.17, "E": 0.7324}
 
 
-def _valve(name: str, d: float, unpowered: str) -> dict[str, object]:
+def _valve(name: str, d: float, lift: float, unpowered: str) -> dict[str, object]:
     return {
         f"{name}.seat.d": chosen(d, "gradients of 1000 to 2500 bar/s"),
         f"{name}.seat.C_d": chosen(0.65, "sharp edge"),
         f"{name}.seat.Re_cr": chosen(100.0, _NONE),
-        f"{name}.lift": chosen(0.25 * MM, "opens the whole orifice"),
+        f"{name}.lift": chosen(lift, "opens the whole orifice"),
         f"{name}.alpha": chosen(math.radians(45.0), _NONE),
         f"{name}.t_delay": chosen(1e-3, _NONE),
         f"{name}.tau": chosen(1e-3, _NONE),
@@ -89,8 +89,8 @@ NUMBERS = {
     "others.V_1": chosen(0.63 * CM3, "a second front brake and two rear brakes of 40 % each"),
     "others.p_1": chosen(4 * BAR, "same as the wheel"),
     "others.c": chosen(0.0198 * CM3 / BAR, "a second front brake and two rear brakes of 40 % each"),
-    **_valve("inlet", 0.5 * MM, "open"),
-    **_valve("outlet", 0.6 * MM, "closed"),
+    **_valve("inlet", 0.5 * MM, 0.18 * MM, "open"),
+    **_valve("outlet", 0.6 * MM, 0.215 * MM, "closed"),
     "check.seat.d": chosen(1.2 * MM, _NONE),
     "check.seat.C_d": chosen(0.65, "sharp edge"),
     "check.seat.Re_cr": chosen(100.0, _NONE),
@@ -98,6 +98,28 @@ NUMBERS = {
     "caliper.V_1": chosen(0.35 * CM3, _NONE),
     "caliper.p_1": chosen(4 * BAR, _NONE),
     "caliper.c": chosen(0.011 * CM3 / BAR, "1.45 cm^3 at 100 bar"),
+    "pump.d_p": chosen(6.5 * MM, _NONE),
+    "pump.e": chosen(1 * MM, _NONE),
+    "pump.phase": chosen(0.0, "starts at a dead center"),
+    "pump.V_dead": chosen(0.02 * CM3, _NONE),
+    "pump.V_gas": chosen(0.0, "bled"),
+    "pump.tau": chosen(5e-5, "at least half the step"),
+    "pump.suction.seat.d": chosen(2.5 * MM, _NONE),
+    "pump.suction.seat.C_d": chosen(0.65, "sharp edge"),
+    "pump.suction.seat.Re_cr": chosen(100.0, _NONE),
+    "pump.suction.p_crack": chosen(0.2 * BAR, "light spring"),
+    "pump.delivery.seat.d": chosen(1.2 * MM, _NONE),
+    "pump.delivery.seat.C_d": chosen(0.65, "sharp edge"),
+    "pump.delivery.seat.Re_cr": chosen(100.0, _NONE),
+    "pump.delivery.p_crack": chosen(0.5 * BAR, _NONE),
+    "pump.G_back": chosen(0.0, "tight"),
+    "pump.p_max": chosen(250 * BAR, "Saab workshop manuals, ABS return pump"),
+    "pump_motor.R_m": chosen(0.15, _NONE),
+    "pump_motor.L_m": chosen(100e-6, _NONE),
+    "pump_motor.K_e": chosen(0.04, "3000 rpm at 13 V"),
+    "pump_shaft.J": chosen(2e-5, _NONE),
+    "pump_shaft.d": chosen(1e-5, _NONE),
+    "accumulator.c_stop": chosen(4e-15, "fluid and a little gas"),
     "accumulator.p_0": chosen(1.5 * BAR, _NONE),
     "accumulator.k": chosen(1 * BAR / CM3, _NONE),
     "accumulator.V_max": chosen(3.5 * CM3, _NONE),
@@ -174,7 +196,10 @@ CORNER = {
     "antilock.abs": chosen("rules", "pulses of the valves need thresholds"),
     "antilock.sees": chosen("estimated", "as on the road"),
     "antilock.M_rate": chosen(2e4, "800 bar/s, as fast as the inlet valve fills the caliper"),
-    "antilock.M_least": chosen(0.0, "no air gap"),
+    "antilock.M_least": derived(
+        lambda par: 2.5 * BAR * brake_disc.torque_per_pressure(par.disc),
+        "above the accumulator's pressure",
+    ),
     "antilock.tau_a": chosen(0.01, "short compared with the anti-lock cycle"),
     "antilock.encoder.law": chosen("pulses", "as in wheel sensors"),
     "antilock.encoder.pulses": chosen(48.0, "common; some have 100"),
@@ -227,7 +252,7 @@ CORNER = {
     "antilock.valves.caliper.c": derived(lambda par: par.caliper.c, _ASSUMED),
     "antilock.valves.p_low": chosen(2 * BAR, "accumulator with 0.5 cm^3"),
     "antilock.valves.t_least": chosen(2e-3, "longer than the delay of the valves"),
-    "antilock.valves.q_pump": chosen(3.3 * CM3, "two pistons at 3000 rpm"),
+    "antilock.valves.q_pump": chosen(3.3 * CM3, "one piston at 3000 rpm"),
 }
 SETS = (
     CitedSet(
