@@ -9,7 +9,7 @@ the pump takes (see ``docs/decisions/0038-starved-pump.md``).
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
@@ -110,11 +110,11 @@ def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
     return spring + (H(above, fluid) - H(p_full, fluid)) / stiff - _gas_work(x, par, fluid)
 
 
-def _gas_work(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Any:
+def _gas_work(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> float:
     """Return the energy that expanding gas has supplied to the outflow."""
     expansion, P_0 = _expanded(x, par, fluid)
     gas = par.c_stop * P_0
-    moments: list[Any] = [
+    moments: list[float] = [
         ops.fmax(-1.0 * x.V, 0.0),
         gas * P_0 * ops.log(expansion),
     ]  # of P^k over volume
