@@ -291,7 +291,7 @@ def _controller() -> list[Row]:
             "bar",
             ends(one("p_set.lost")),
         ),
-        Row("gear.jammed", "pressure does not change", 37.0, "bar", ends(one("gear.jammed"))),
+        Row("gear.jammed", "pressure after the fault", 37.0, "bar", ends(one("gear.jammed"))),
     ]
 
 
@@ -332,7 +332,7 @@ def _fluid() -> list[Row]:
         ),
         Row(
             "caliper.heated 5 ml",
-            "drag pressure after 30 K",
+            "drag pressure after heating by 30 K",
             (7.0, 13.0),
             "bar",
             lambda: 30.0 * expansion(5e-6, 6.0),
@@ -347,7 +347,7 @@ def _fluid() -> list[Row]:
         ),
         Row(
             "caliper.heated 64 ml",
-            "pressure rise of all fluid, compliant line",
+            "pressure rise with all fluid heated, compliant line",
             3.1,
             "bar/K",
             lambda: expansion(64e-6, 1.0),
