@@ -39,7 +39,7 @@ PHASE = (
 LATE = (
     "with a delay of five ticks, the current loop is unstable. Its phase "
     "crosses -180 degrees at 44 Hz, where its gain is 1.28. Without dither, "
-    "it oscillates at 41 Hz with 18 A. It amplifies the 50 Hz dither by a factor of 4.6 to 13.5 "
+    "it oscillates at 41 Hz with 18 A. It amplifies the 50 Hz dither by a factor of 4.6, to 13.5 "
     "A, in addition to 3.6 A at 41 Hz. Near the resonance, the result depends strongly on the "
     "gain. With 10 % more or less integral gain, the ripple is 12.1 or 8.1 A. With 17 % less, it"
     " is 7 A. "

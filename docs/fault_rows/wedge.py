@@ -249,7 +249,7 @@ def _motors() -> list[Row]:
             (0.0, 40.0),
             "um",
             moved,
-            "26 um of the travel are free play. The other 27 um come from the spring of 24 N/um,"
+            "26 um of the travel is free play. The other 27 um come from the spring of 24 N/um,"
             " which presses the wedge against the jammed screw with 647 N and then relaxes",
         ),
         Row(
