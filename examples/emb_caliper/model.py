@@ -12,13 +12,13 @@ from bywire.plant import (
     battery_supply,
     dc_motor,
     end_stop,
+    floating_caliper,
     h_bridge,
     pad_hysteresis,
 )
 from emb_caliper import ecu
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
     load_cell,
     load_friction,
     planetary_gear,

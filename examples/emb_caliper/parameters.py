@@ -20,6 +20,7 @@ from bywire.plant import (
     current_sensor,
     dc_motor,
     end_stop,
+    floating_caliper,
     h_bridge,
     inverter,
     pad_hysteresis,
@@ -27,7 +28,6 @@ from bywire.plant import (
 )
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
     load_cell,
     load_friction,
     planetary_gear,

@@ -12,6 +12,7 @@ from bywire.plant import (
     angle_sensor,
     battery_supply,
     end_stop,
+    floating_caliper,
     inverter,
     pad_hysteresis,
     pmsm,
@@ -19,7 +20,6 @@ from bywire.plant import (
 from emb_caliper import ecu, ecu_pmsm
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
     load_cell,
     load_friction,
     planetary_gear,
