@@ -108,10 +108,12 @@ def current_tick(r: Readings, m: Any, u: Stimulus, par: Par) -> Any:
     """Run current control once."""
     if par.drive == "current":
         m = m._replace(i_ref=u.i_set)
+    i = measured_current(r.i, u.noise_i, par)
+    m = estimation.summed(i, m, par)
     limit = h_bridge.limited(par.ecu.current.D_max, par.bridge)
     state, out = current_pi.output(
         current_pi.State(m.current_integral),
-        current_pi.Input(i_ref=m.i_ref, i_meas=measured_current(r.i, u.noise_i, par), D_lim=limit),
+        current_pi.Input(i_ref=m.i_ref, i_meas=i, D_lim=limit),
         par.ecu.T_current,
         par.ecu.current,
     )

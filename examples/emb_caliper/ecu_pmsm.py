@@ -71,9 +71,14 @@ class Readings(NamedTuple):
 
 def estimate_tick(r: Readings, m: Any, u: Stimulus, par: Par) -> Any:
     """Advance the estimate of the clamp force by one sample, from the torque-producing current."""
+    return estimation.estimated(r.theta, _torque_current(r, u, par), m, par)
+
+
+def _torque_current(r: Readings, u: Stimulus, par: Par) -> float:
+    """Return the torque-producing current as the ECU measures it."""
     i_alpha, i_beta = _currents(r, u, par)
     _, i_q = inverter.rotated(i_alpha, i_beta, par.ecu.current.p * r.theta)
-    return estimation.estimated(r.theta, i_q, m, par)
+    return i_q
 
 
 def _currents(r: Readings, u: Stimulus, par: Par) -> tuple[float, float]:
@@ -91,6 +96,7 @@ def current_tick(r: Readings, m: Any, u: Stimulus, par: Par) -> Any:
     """Apply the duties of the last tick, and run field-oriented control once for the next one."""
     if par.drive == "current":
         m = m._replace(i_ref=u.i_set)
+    m = estimation.summed(_torque_current(r, u, par), m, par)
     i_alpha, i_beta = _currents(r, u, par)
     state, out = field_oriented.output(
         field_oriented.State(m.z_d, m.z_q, m.i_fw),

@@ -16,6 +16,7 @@ from emb_caliper.laws import force_monitor
 class Results(NamedTuple):
     """Results of each tick."""
 
+    i_sum: Annotated[float, Signal("A", "sum of the current's samples", 50.0)]
     F_used: Annotated[float, Signal("N", "clamp force for control", 1e4)]
     T_load: Annotated[float, Signal("N*m", "estimated load torque", 0.5)]
     F_balance: Annotated[float, Signal("N", "clamp force of the torque balance", 1e4)]
@@ -31,17 +32,22 @@ Memory: Any = joined(
 def estimated(theta: float, i: float, m: Any, par: Any) -> Any:
     """Advance the estimate, and its training, by one sample.
 
+    It uses the mean of the current since the last sample (trapezoidal rule), because the current
+    changes quickly right after each sample of the speed control.
+
     Parameters
     ----------
     theta, i
         Measured motor angle [rad] and current [A].
     """
     ecu = par.ecu
+    mean = (m.i_sum + 0.5 * i) * (ecu.T_current / ecu.T_force)
+    m = m._replace(i_sum=-0.5 * i)  # current control adds this sample in full
     learned = _part(training.State, m)
     held = training.brake(learned, ecu.estimator)
     state, out = estimator.output(
         _part(estimator.State, m),
-        estimator.Input(theta, ecu.K_t_hat * i),
+        estimator.Input(theta, ecu.K_t_hat * mean),
         held,
         ecu.T_force,
         ecu.estimator,
@@ -59,6 +65,11 @@ def estimated(theta: float, i: float, m: Any, par: Any) -> Any:
         ecu.training,
     )
     return m._replace(**learned._asdict())
+
+
+def summed(i: float, m: Any, par: Any) -> Any:
+    """Return the memory with a sample of the current."""
+    return m._replace(i_sum=m.i_sum + i) if par.ecu.estimation == "on" else m
 
 
 def fed_back(m: Any, par: Any) -> Any:

@@ -97,7 +97,7 @@ class CaliperBrake(Assembly[ParT, MemoryT]):
         if par.drive == "current":
             return (current,)
         slow = [("force", laws.force_tick), ("speed", laws.speed_tick)]
-        if par.ecu.feedback != "sensor":
+        if par.ecu.estimation == "on":
             slow.insert(0, ("estimate", laws.estimate_tick))
         outer = tuple(Task(name, par.ecu.T_force, self.sensed(law)) for name, law in slow)
         return (*outer, current)

@@ -83,7 +83,9 @@ class CascadeParameters(ParameterSet):
     load: Literal["off", "fed-forward"]
     """whether feed-forward adds the current that holds the force"""
     feedback: Literal["sensor", "fallback", "estimate"]
-    """source of the clamp force for control; with "sensor", no estimate is computed"""
+    """source of the clamp force for control"""
+    estimation: Literal["off", "on"]
+    """whether the ECU estimates the clamp force"""
     K_t_hat: TorqueConstant
     """torque per current"""
     force: limited_pi.ForceParameters
@@ -99,6 +101,11 @@ class CascadeParameters(ParameterSet):
             raise ValueError(
                 f"T_force = {self.T_force:g} s must be a whole multiple of T_current = "
                 f"{self.T_current:g} s"
+            )
+        if self.feedback != "sensor" and self.estimation == "off":
+            raise ValueError(
+                f"feedback = {self.feedback} needs an estimate of the clamp force. Set "
+                "estimation = on, or feedback = sensor"
             )
         return self
 

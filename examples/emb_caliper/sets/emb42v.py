@@ -91,6 +91,7 @@ _KNOWN = "identified without error"
 _TRIAL = "tuned on simulated strokes with all errors of the brake's properties"
 _ESTIMATE = {
     "ecu.feedback": chosen("sensor", "the standard cascade trusts the load cell"),
+    "ecu.estimation": chosen("off", "the standard cascade needs no estimate"),
     "ecu.K_t_hat": derived(lambda par: par.motor.K_e, _KNOWN),
     "ecu.estimator.theta_0": derived(
         lambda par: par.caliper.clearance / travel_per_angle(par), _KNOWN
@@ -219,6 +220,7 @@ _SENSORS = {
     "encoder.law": chosen("real", "rounded to whole counts"),
     "current_adc.law": chosen("quantized", "real converters have a finite resolution"),
     "current_adc.noise": chosen(1e-3, "0.1 A of 100 A"),
+    "ecu.estimation": chosen("on", "for the feedback"),
     "ecu.feedback": chosen("fallback", "the estimate replaces a lost load cell"),
 }
 ESTIMATED = CitedSet(

@@ -156,7 +156,7 @@ class Input(NamedTuple):
     """Sensor readings."""
 
     theta: Angle
-    torque: Annotated[float, Signal("N*m", "motor torque from the measured current", 0.5)]
+    torque: Annotated[float, Signal("N*m", "motor torque, mean since the last sample", 0.5)]
 
 
 class Output(NamedTuple):
@@ -242,7 +242,7 @@ def output(x: State, u: Input, held: Brake, T: SampleTime, par: Parameters) -> t
     grown = x.F_variance + 2.0 * par.spread_s * par.spread_s * F_curve * ops.fabs(rise)
     uncertain = _variance(F, moved.motion, out.T_J, held, par) * (par.tau / T)
     g = ops.where(out.valid > 0.5, grown / (grown + uncertain), 0.0)
-    # Like the second pole of the torque, this one reads the last value of the first.
+    # A force at a sample is delayed by one sample, like the torque, which is centered there.
     a = weight(T, par)
     F_hat_2 = x.F_hat_2 + a * (x.F_hat_1 - x.F_hat_2)
     corrected = ops.fmax(F + g * (out.F_balance - F_hat_2), 0.0)
@@ -267,14 +267,16 @@ def _started(x: State, first: State) -> State:
 def _filtered(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
     """Return the state with the filters of torque and angle one sample later.
 
-    The second pole of the torque reads the first pole before its update, because the second
-    difference of the angle is centered one sample back.
+    The second difference of the angle is centered one sample back, and the mean torque half a
+    sample. Therefore, the second pole of the torque reads the mean of the first pole's last two
+    values.
     """
     a = weight(T, par)
+    torque_1 = x.torque_1 + a * (u.torque - x.torque_1)
     angle_1 = x.angle_1 + a * (u.theta - x.angle_1)
     return x._replace(
-        torque_1=x.torque_1 + a * (u.torque - x.torque_1),
-        torque_2=x.torque_2 + a * (x.torque_1 - x.torque_2),
+        torque_1=torque_1,
+        torque_2=x.torque_2 + a * (0.5 * (x.torque_1 + torque_1) - x.torque_2),
         angle_1=angle_1,
         angle_2=x.angle_2 + a * (u.theta - angle_1 - x.angle_2),
     )
