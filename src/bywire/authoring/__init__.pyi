@@ -32,8 +32,8 @@ from bywire.bench.stated import StatedFigure as StatedFigure
 from bywire.bench.stated import StatedLevel as StatedLevel
 from bywire.bench.stated import StatedRange as StatedRange
 from bywire.bench.stimulus import Stimulus as Stimulus
-from bywire.campaigns.residual import DeclaredCampaign as DeclaredCampaign
 from bywire.campaigns.residual import NEVER as NEVER
+from bywire.campaigns.residual import DeclaredCampaign as DeclaredCampaign
 from bywire.campaigns.residual import Residual as Residual
 from bywire.campaigns.residual import mean_of_the_last as mean_of_the_last
 from bywire.core import quantities as quantities
