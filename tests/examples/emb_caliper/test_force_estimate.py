@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections.abc import Callable
@@ -309,3 +310,76 @@ def test_hysteresis_has_its_loss(caliper: Path) -> None:
     residual = float(np.abs(energy_residual(run)).max())
     assert residual <= 1e-6 * source
     assert math.isfinite(residual)
+
+
+# --- Identification, campaign, study
+
+
+def test_a_recorded_stroke_gives_the_starting_values(
+    emb: Any, par: Any, command: Callable[..., tuple[int, str, str]]
+) -> None:
+    from bywire.identification.method import Effort
+
+    method = emb("methods.clamp_force_strokes").METHOD
+    data = method.synthetic(par, method.defaults, 3)
+    start = par.replace({f"{ESTIMATOR}theta_0": 40.0, **believed(par, 1.3, 2.0, 0.5)})
+    found = method.identify(data, start, method.defaults, Effort())
+    assert all(check.holds for check in found.checks)
+    (best,) = found.estimates.values()
+    for name, value, (low, high) in zip(best.names, best.values, best.intervals(0.99), strict=True):
+        assert low <= par.value(name) <= high, name
+        assert value == pytest.approx(par.value(name), rel=0.02), name
+    # Without the release, scale and friction are not separate.
+    with pytest.raises(ParameterError, match="do not contain a stroke in both directions"):
+        method.identify(data.isel(time=slice(0, 2500)), par, method.defaults, Effort())
+    code, out, err = command("identify", "clamp-force-strokes", "--synthetic", "1")
+    assert code == 0, err
+    assert "ecu.estimator.G_hat" in out
+
+
+def test_the_method_detects_pads_with_hysteresis(emb: Any, par: Any) -> None:
+    from bywire.identification.method import Effort
+
+    method = emb("methods.clamp_force_strokes").METHOD
+    data = method.synthetic(par.replace(PADS), method.defaults, 3)
+    found = method.identify(data, par, method.defaults, Effort())
+    assert not all(check.holds for check in found.checks)
+
+
+def test_a_campaign_shows_that_the_estimate_replaces_the_load_cell(
+    command: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    classes = {}
+    for feedback in ("sensor", "fallback"):
+        campaign = tmp_path / f"{feedback}.toml"
+        campaign.write_text(
+            f'bench = "clamp-step"\n[set]\nparameters = "{SETS[0]}"\n"options.F_to" = "20 kN"\n'
+            f'"ecu.feedback" = "{feedback}"\n'
+            '[campaign]\nonly = ["force.lost", "force.stuck", "force.gain", "encoder.gain"]\n'
+            'healthy = 8\nonset = "0.3 s"\n[[criteria]]\nname = "too much"\nsignal = "F_cl"\n'
+            'above_healthy = "4 kN"\nlasting = "20 ms"\n'
+        )
+        code, out, err = command("faults", campaign, "--json")
+        assert code in (0, 1), err
+        classes[feedback] = {each["fault"]: each["class"] for each in json.loads(out)["faults"]}
+    for fault in ("force.lost", "force.stuck", "force.gain"):
+        assert classes["sensor"][fault] == "covered"
+        assert classes["fallback"][fault] == "harmless, seen"
+    assert classes["fallback"]["encoder.gain"] == "harmless, seen"
+
+
+def test_the_brakes_campaign_is_listed(command: Callable[..., tuple[int, str, str]]) -> None:
+    code, out, _ = command("list", "campaigns")
+    assert code == 0
+    assert "emb-caliper-pmsm" in out
+
+
+def test_the_tolerance_study_meets_its_requirements(
+    caliper: Path, command: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    text = (caliper / "studies" / "force_estimate.toml").read_text(encoding="utf-8")
+    study = tmp_path / "force.toml"
+    study.write_text(text.replace("cases = 256", "cases = 64"), encoding="utf-8")
+    code, out, err = command("study", "run", study, "--out", tmp_path / "out", "--json")
+    assert code in (0, 1), err
+    assert "rms_error" in out
