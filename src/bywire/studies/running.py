@@ -9,6 +9,7 @@ from functools import partial
 
 from bywire.bench import running
 from bywire.bench.running import Result
+from bywire.core.copies import processes_with_brakes
 from bywire.core.typing import Progress
 from bywire.simulation.cuda import find_device
 from bywire.simulation.engine import CUDA
@@ -33,6 +34,21 @@ class Completed:
 
     nominal: Result
     damaged: int
+
+
+def _require_device() -> None:
+    """Fail if there is no graphics processor.
+
+    Another process looks for it, because copies of a process that has used the driver cannot use
+    it.
+    """
+    with processes_with_brakes(1, "check the driver") as pool:
+        pool.submit(_device_label).result()
+
+
+def _device_label() -> str:
+    label: str = find_device().label
+    return label
 
 
 def complete(
@@ -79,7 +95,7 @@ def complete(
     until = time.monotonic() + plan.time
     require_workers(workers, cluster, plan.bench.engine)
     if plan.bench.engine == CUDA:
-        find_device()  # fails here, before the folder is created
+        _require_device()  # fails here, before the folder is created
     store.open(plan, origin)
     damaged = store.drop_damaged()
     itself = partial(running.run, plan.bench, estimate_error=True)
