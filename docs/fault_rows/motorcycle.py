@@ -154,7 +154,7 @@ def _motor_and_sensors() -> list[Row]:
             1.43,
             "1",
             current_ratio,
-            "the ECU's parameters are for strong magnets, so its dither is also weaker. The "
+            "the ECU's parameters assume strong magnets, so its dither is also weaker. The "
             "piston sticks permanently, and friction supports part of the load. With the correct"
             " torque constant in the ECU, the value is 1.42",
         ),

@@ -65,8 +65,8 @@ def _neutral_band(q: Quoted) -> RootCause:
         f"friction the brake runs away above {q('stability.runaway')} "
         f"({q.stated('stability.runaway')} stated). Dry friction in bearings, "
         "screws and wedge holds the brake without power below "
-        f"{q('stability.runaway.friction')} at 500 Nm and "
-        f"{q('stability.runaway.friction.950')} at 950 Nm.",
+        f"{q('stability.runaway.friction')} at 500 N·m and "
+        f"{q('stability.runaway.friction.950')} at 950 N·m.",
         ("stability.runaway.friction",),
     )
 
