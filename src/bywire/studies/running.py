@@ -9,7 +9,7 @@ from functools import partial
 
 from bywire.bench import running
 from bywire.bench.running import Result
-from bywire.core.copies import processes_with_brakes
+from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.typing import Progress
 from bywire.simulation.cuda import find_device
 from bywire.simulation.engine import CUDA
@@ -39,16 +39,19 @@ class Completed:
 def _require_device() -> None:
     """Fail if there is no graphics processor.
 
-    Another process looks for it, because copies of a process that has used the driver cannot use
-    it.
+    A copy of this process looks for it if workers will be copies too, because copies of a process
+    that has used the driver cannot use it.
     """
+    if not may_copy():
+        find_device()
+        return
     with processes_with_brakes(1, "check the driver") as pool:
-        pool.submit(_device_label).result()
+        pool.submit(find_device_name).result()
 
 
-def _device_label() -> str:
-    label: str = find_device().label
-    return label
+def find_device_name() -> str:
+    """Return the name of the graphics processor, which workers can send."""
+    return str(find_device().label)
 
 
 def complete(
