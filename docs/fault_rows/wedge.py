@@ -175,8 +175,8 @@ FIVEFOLD = (
     "4 um, 1.19 at 8 um, 1.07 at 12 um and 0.98 at 20 um"
 )
 STANDING = (
-    "2 mu_B r_B K_cal times the peak-to-peak runout is 21.0 N m, and five times this value with "
-    "five times the runout"
+    "2 mu_B r_B K_cal times the peak-to-peak runout is 21.0 N m. With five times the runout, the "
+    "ripple is five times as large"
 )
 CREEP = (
     "0.1 mm corresponds to 0.863 rad at the motors, which takes 7.19 ms at the gap mode's 120 "

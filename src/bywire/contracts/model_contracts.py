@@ -295,8 +295,8 @@ def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
             left = (4.0 * each.closing_error - before) / 3.0 / each.turnover
             where = f" in the balance {book!r}" if book else ""
             text = (
-                f"the residual{where} of a {size} run is {abs(left):.1e} of its turnover of "
-                f"{each.turnover:.3g} J"
+                f"the residual{where} of a {size} run is {abs(left):.1e} of the "
+                f"{each.turnover:.3g} J transferred"
             )
             yield measured(abs(left), RESIDUAL, text, place)
 
