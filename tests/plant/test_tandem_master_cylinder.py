@@ -72,8 +72,8 @@ class Tandem(Assembly[Parameters, Stimulus]):
     chamber_2 = Part(master_cylinder, par="chamber", state={"p": "p_2"}, loss="E_damping")
     seal_1 = Part(cup_seal, par="seal")
     seal_2 = Part(cup_seal, par="seal")
-    stop_1 = Part(end_stop, par="stop", work="W_stop_1", loss="E_stop_1", which="1")
-    stop_2 = Part(end_stop, par="stop", work="W_stop_2", loss="E_stop_2", which="2")
+    stop_1 = Part(end_stop, par="stop", work="W_stop_1", loss="E_stop", which="1")
+    stop_2 = Part(end_stop, par="stop", work="W_stop_2", loss="E_stop", which="2")
     port_1 = Part(reservoir_port)
     port_2 = Part(reservoir_port)
     line_1 = Part(orifice, par="line", loss="E_line")
@@ -205,7 +205,7 @@ def at(result: Trajectory, name: str, t: float) -> float:
 
 def residual(result: Trajectory) -> float:
     """Return the residual of the energy balance, relative to the energy of the push rod."""
-    sinks = ("damping", "line", "seals", "port", "stop_1", "stop_2", "stored")
+    sinks = ("damping", "line", "seals", "port", "stop", "stored")
     rest = result["E_source"] - sum(result[f"E_{name}"] for name in sinks)
     return float(np.abs(rest - rest[0]).max() / result["E_source"].max())
 
