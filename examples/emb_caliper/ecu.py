@@ -42,9 +42,9 @@ class Memory(NamedTuple):
     sat_speed: Annotated[float, Signal("1", "speed demand saturated")]
     sat_current: Annotated[float, Signal("1", "current demand saturated")]
     sat_duty: Annotated[float, Signal("1", "duty cycle saturated")]
-    force_integral: Annotated[float, Signal("rad/s", "integral part of the force PI", 10.0)]
-    speed_integral: Annotated[float, Signal("A", "integral part of the speed PI", 5.0)]
-    current_integral: Annotated[float, Signal("1", "integral part of the current PI", 0.3)]
+    force_integral: Annotated[float, Signal("rad/s", "integral term of the force PI", 10.0)]
+    speed_integral: Annotated[float, Signal("A", "integral term of the speed PI", 5.0)]
+    current_integral: Annotated[float, Signal("1", "integral term of the current PI", 0.3)]
 
 
 class Readings(NamedTuple):

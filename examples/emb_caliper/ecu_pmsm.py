@@ -38,10 +38,10 @@ class Memory(NamedTuple):
     sat_speed: Annotated[float, Signal("1", "speed demand saturated")]
     sat_current: Annotated[float, Signal("1", "current demand saturated")]
     sat_duty: Annotated[float, Signal("1", "voltage saturated")]
-    force_integral: Annotated[float, Signal("rad/s", "integral part of the force PI", 10.0)]
-    speed_integral: Annotated[float, Signal("A", "integral part of the speed PI", 5.0)]
-    z_d: Annotated[float, Signal("V", "d-axis integral part of the current PI", 1.0)]
-    z_q: Annotated[float, Signal("V", "q-axis integral part of the current PI", 1.0)]
+    force_integral: Annotated[float, Signal("rad/s", "integral term of the force PI", 10.0)]
+    speed_integral: Annotated[float, Signal("A", "integral term of the speed PI", 5.0)]
+    z_d: Annotated[float, Signal("V", "d-axis integral term of the current PI", 1.0)]
+    z_q: Annotated[float, Signal("V", "q-axis integral term of the current PI", 1.0)]
     i_fw: Annotated[float, Signal("A", "field-weakening current", 1.0)]
 
 

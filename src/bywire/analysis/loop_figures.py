@@ -145,18 +145,22 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
             is_less_better=True,
         ),
         LoopFigure(
-            "overshoot", "%", "overshoot of the unit step at the sample times", is_less_better=True
+            "overshoot",
+            "%",
+            "overshoot of the unit step response at the sample times",
+            is_less_better=True,
         ),
         LoopFigure(
             "settling_time",
             "s",
-            "settling time of the unit step, to 2 % of its height",
+            "settling time of the unit step response, to within 2 % of the step height",
             is_less_better=True,
         ),
         LoopFigure(
             "steady_state_error",
             "%",
-            "remaining error of a unit step after ten periods of the bandwidth",
+            "remaining error of the unit step response after ten periods of the bandwidth "
+            "frequency",
             is_less_better=True,
         ),
     )

@@ -236,7 +236,8 @@ def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
     designed = tuple(each for each in models[:count] if each is not None)
     if not designed:
         raise ParameterError(
-            f"{file}: no model exists for any of its {count} draws. Narrow its [vary] section",
+            f"{file}: none of its {count} draws results in a valid model. Narrow its [vary] "
+            "section",
             name=str(file),
             value=str(count),
         )

@@ -943,7 +943,7 @@ class Identification(Answer):
         reason = (
             "no estimate is usable"
             if asked
-            else f"{method.name} does not identify parameters of an assembly. Its figures are in "
+            else f"{method.name} does not identify parameters of an assembly. Its results are in "
             "estimate.json"
         )
         return [f"no parameters.toml: {reason}"]

@@ -89,7 +89,7 @@ class Delivery:
     energy
         Maximum returned energy in J, >= 0. For the rows of several runs, an array of shape (runs,).
     turnover
-        Energy turnover of the balance in J.
+        Energy transferred in the balance in J.
     """
 
     name: str
@@ -313,9 +313,9 @@ def energy_doubts_of_cases(
         is_wrong = np.broadcast_to(_is_delivered(each), cases)
         for k in np.flatnonzero(is_wrong).tolist():
             doubts[k].append(
-                f"the loss {each.label!r}{where} ({each.name}) delivers {energies[k]:.3g} J of a "
-                f"turnover of {totals[k]:.3g} J, which is impossible. Do not trust this run. Use "
-                "a smaller step, and check for an extreme parameter"
+                f"the loss {each.label!r}{where} ({each.name}) delivers {energies[k]:.3g} J of "
+                f"{totals[k]:.3g} J transferred, which is impossible. Do not trust this run. Use a "
+                "smaller step, and check for an extreme parameter"
             )
     if _are_surely_closed(recording):
         return doubts
@@ -324,9 +324,9 @@ def energy_doubts_of_cases(
     for k, (left, total) in enumerate(zip(error.tolist(), turned.tolist(), strict=True)):
         if abs(left) > _OPEN * total + _NOTHING:
             doubts[k].append(
-                f"the energy balance is off by {abs(left):.3g} J of a turnover of "
-                f"{total:.3g} J. Do not trust this run. Use a smaller step, and check for an "
-                "extreme parameter"
+                f"the energy balance has an error of {abs(left):.3g} J of "
+                f"{total:.3g} J transferred. Do not trust this run. Use a smaller step, and check "
+                "for an extreme parameter"
             )
     return doubts
 

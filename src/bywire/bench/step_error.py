@@ -56,7 +56,8 @@ def unestimated(failures: Mapping[float, Exception]) -> str:
     """Return the warning that the bench runs with no other step, and the reason for each ratio."""
     reasons = ", ".join(f"{_share(factor)}: {error}" for factor, error in failures.items())
     return (
-        "the numerical error of the figures is unknown because the bench runs neither with half "
+        "the numerical error of the key figures is unknown because the bench runs neither with "
+        "half "
         f"the step nor with twice the step ({reasons})"
     )
 

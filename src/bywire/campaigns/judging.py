@@ -65,8 +65,9 @@ def require_small(plan: CampaignPlan) -> None:
     if runs * rows * signals > _MOST:
         raise ParameterError(
             f"{runs} runs with {rows:.3g} rows of {signals} signals exceed the limit of "
-            f"{_MOST:.3g} numbers. Use fewer healthy runs or onsets, a shorter maneuver, or a "
-            "longer simulation.record",
+            f"{_MOST:.3g} numbers. Use fewer fault-free runs (healthy) or onsets, a shorter "
+            "maneuver, "
+            "or a longer simulation.record",
             name="simulation.record",
             valid=f"{_MOST:.3g}",
         )

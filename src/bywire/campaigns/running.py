@@ -206,7 +206,7 @@ class CampaignFindings:
         """Warnings from the solver, with the number of faults that caused them."""
         counts = Counter(text for each in self.faults for text in dict.fromkeys(each.doubts))
         return (
-            *(f"healthy runs: {text}" for text in self.healthy.traces.doubts),
+            *(f"fault-free runs: {text}" for text in self.healthy.traces.doubts),
             *(f"runs with {n} of the faults: {text}" for text, n in counts.items()),
         )
 
@@ -379,7 +379,7 @@ def run_campaign(
     """
     if store is not None:
         store.begin(plan, {"name": plan.name})
-    progress("healthy runs", 0.0)
+    progress("fault-free runs", 0.0)
     healthy = judge_healthy(plan, healthy_traces(plan))
     # Each fault uses only a few lanes, so several faults in parallel use the cores better.
     outcomes = complete(

@@ -61,8 +61,8 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Integral parts, and the field-weakening current."""
 
-    z_d: Annotated[float, Signal("V", "integral part, along the magnets", 1.0)]
-    z_q: Annotated[float, Signal("V", "integral part, across the magnets", 1.0)]
+    z_d: Annotated[float, Signal("V", "integral term, along the magnets", 1.0)]
+    z_q: Annotated[float, Signal("V", "integral term, across the magnets", 1.0)]
     i_fw: Annotated[float, Signal("A", "field-weakening current", 1.0)]
 
 
@@ -141,7 +141,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
         v_q = k_p e_q + z_q + \omega_e (L_d i_d + \psi)
 
     A voltage above :math:`V_{dc}/\sqrt 3` is limited in magnitude and keeps its direction. The
-    integral parts follow the limited voltage. The voltage then gets a lead angle: the rotation of
+    integral terms follow the limited voltage. The voltage then gets a lead angle: the rotation of
     the rotor until the middle of the sample in which the inverter applies the voltage.
 
     Field weakening integrates the voltage above the reserve, weighted by how much a current against

@@ -147,7 +147,8 @@ def _missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     counts = {name: int(np.isnan(data[name].values).sum()) for name in compared}
     total = data.sizes["time"]
     return [
-        f"{name} lacks {count} of {total} samples ({100.0 * count / total:.2g} %), which bywire "
+        f"{name} is missing {count} of {total} samples ({100.0 * count / total:.2g} %), which "
+        "bywire "
         "does not compare"
         for name, count in counts.items()
         if count

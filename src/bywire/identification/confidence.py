@@ -459,7 +459,8 @@ def disagreements(estimates: Mapping[str, Estimate]) -> tuple[Disagreement, ...]
     """
     if len(estimates) < 2:
         raise ParameterError(
-            "a single estimate cannot be compared. Pass one for each record", name="estimates"
+            "a single estimate cannot be compared. Pass one estimate for each record",
+            name="estimates",
         )
     tables = {
         label: {

@@ -513,7 +513,7 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     rmse = float(np.sqrt(np.mean(error**2)))
     variance = float(np.var(y)) if np.ptp(y) else 0.0  # not the rounding errors
     lag, lag_note = _lag(part, there)
-    still = "the measured signal does not move"
+    still = "the measured signal does not change"
     return (
         Kpi("rmse", rmse, off, "Root mean square of modeled minus measured."),
         Kpi(

@@ -45,7 +45,7 @@ class Parameters(ParameterSet):
     h_0: Convection
     """convection coefficient at rest"""
     h_1: Convection
-    """increase over h_0 at the speed v_ref"""
+    """increase of the heat transfer coefficient over h_0 at the speed v_ref"""
     v_ref: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
     """reference speed of h_1"""
     epsilon: Weight
@@ -67,7 +67,7 @@ class Parameters(ParameterSet):
     T_2: Temperature
     """disc temperature above which the pads are fully faded"""
     f: Weight
-    """friction of fully faded pads, relative to cold pads"""
+    """friction coefficient of fully faded pads, relative to cold pads"""
     T_boil: Temperature
     """boiling point of fresh fluid at atmospheric pressure"""
     T_wet: Temperature

@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
     p_high: SignedPressure
     """maximum absolute pressure of the range"""
     place: Literal["master-cylinder", "mid-pipeline"]
-    """position; mid-pipeline measures the mean of the pressures at both ends"""
+    """sensor position; mid-pipeline measures the mean of the pressures at both ends"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:

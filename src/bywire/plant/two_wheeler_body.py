@@ -39,7 +39,7 @@ class Parameters(ParameterSet):
     h: Length
     """height of the center of gravity"""
     h_a: Length
-    """height at which air drag acts"""
+    """height at which aerodynamic drag acts"""
     inertia: BodyInertia
     """pitch inertia about the center of gravity"""
     CdA: Annotated[float, Unit("m**2", 0.4), Field(ge=0, allow_inf_nan=False)]
@@ -147,8 +147,8 @@ def rear_load(
 
 
 def rigid_rear_load(
-    mu_f: Annotated[float, Signal("1", "front braking force relative to load", 1.0)],
-    mu_r: Annotated[float, Signal("1", "rear braking force relative to load", 1.0)],
+    mu_f: Annotated[float, Signal("1", "front braking force relative to the wheel load", 1.0)],
+    mu_r: Annotated[float, Signal("1", "rear braking force relative to the wheel load", 1.0)],
     F_d: Annotated[float, Signal("N", "air drag", 100.0)],
     cosine: Cosine,
     par: Parameters,

@@ -110,7 +110,7 @@ def alarm_curves(curves: Mapping[str, Curve], healthy: int) -> Figure:
     axes.set_xscale("symlog", linthresh=100.0 / healthy)
     axes.set_yscale("log")
     style.log_ticks(axes.yaxis)
-    axes.set_xlabel("healthy runs with an alarm [%]")
+    axes.set_xlabel("fault-free runs with an alarm [%]")
     axes.set_ylabel("median delay [ms]")
     style.legend_above(axes)
     return figure

@@ -693,7 +693,7 @@ def _stops(
     places = [_index(model, name) for name in model.stops]
     if depends(gaps(s.x, s.x), ca.vertcat(*(s.x[k] for k in places))):
         raise ModelError(
-            f"{model.name}: overlaps of contacts depend on stop operators: use other states",
+            f"{model.name}: overlaps of contacts depend on stop operators. Use other states",
             name="gap",
             value=", ".join(model.stops),
             valid="overlaps without stop operators",

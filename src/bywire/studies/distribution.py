@@ -784,7 +784,7 @@ def _normal(entry: _Entry) -> Distribution:
 def _lognormal(entry: _Entry) -> Distribution:
     median = entry.level("median", entry.nominal)
     if not median > 0.0:
-        raise entry.refused(f"the median {entry.amount(median)} must be above zero")
+        raise entry.refused(f"the median {entry.amount(median)} must be > 0")
     variation = entry.width("sd", median) / median
     sigma = math.sqrt(math.log1p(variation**2))
     text = f"log-normal, median {entry.amount(median)}, sd {100.0 * variation:.3g} %"

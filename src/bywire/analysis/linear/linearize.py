@@ -258,8 +258,8 @@ def _stiffness(
         left, slack, K = _active(C, d)
         if left < _TOUCH:
             raise ParameterError(
-                f"{model.name}: contact {at + int(np.argmin(slack))} just touches "
-                "at the operating point. Choose a point at which it is clearly open or closed",
+                f"{model.name}: contact {at + int(np.argmin(slack))} is just touching at the "
+                "operating point. Choose a point at which it is clearly open or closed",
                 name="contact",
             )
         blocks.append(K)

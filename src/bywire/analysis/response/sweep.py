@@ -272,7 +272,7 @@ def _require_alike(run: Run, sweep: Sweep, points: Sequence[Run]) -> None:
         if structure_of(variant.model, variant.par) != structure:
             raise ParameterError(
                 f"variant {k} has a different model or a different choice. All variants need the "
-                "same ones",
+                "same model and choices",
                 name="variants",
                 value=str(k),
             )

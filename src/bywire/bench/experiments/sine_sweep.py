@@ -47,9 +47,9 @@ class Options(ParameterSet):
     n: Count
     """number of frequencies, with logarithmic spacing"""
     n_settle: Count
-    """settling periods at each frequency"""
+    """number of settling periods at each frequency"""
     n_periods: Count
-    """evaluated periods at each frequency"""
+    """number of evaluated periods at each frequency"""
     record: Duration
     """recording interval"""
     settle: TimeConstant

@@ -106,7 +106,7 @@ def final_winding(data: Warming) -> float | Undefined:
 def time_derated(data: Warming) -> float | Undefined:
     """Time during which the motor's current is limited because of high temperature.
 
-    Trapezoidal integral of the mode's samples: a change counts as halfway between two samples.
+    Trapezoidal integral of the mode's samples: a change is assumed halfway between two samples.
     """
     if data.derated is None:
         return Undefined("the mode 'derated' is not recorded")

@@ -260,7 +260,7 @@ def _figures(par: Par, values: Array, periods: int, samples: int) -> dict[str, f
 def _ripple(pressure: Array, samples: int) -> float:
     """Return the dither's ripple: the pressure's peak-to-peak value, as the median of all periods.
 
-    If dither is too weak to free the piston, the controller's integral part does so occasionally.
+    If dither is too weak to free the piston, the controller's integral term does so occasionally.
     The median ignores these jumps.
     """
     return float(np.median(np.ptp(pressure.reshape(-1, samples), axis=1)))

@@ -126,7 +126,8 @@ def _set_point(force: float, par: MotorcycleParameters) -> float:
 EXPERIMENT = Experiment(
     name="pedal-tracking",
     assembly="motorcycle-brake",
-    summary="pressure follows a built-in or measured trace of the rider's pedal (Fig. 7b)",
+    summary="pressure follows a built-in or measured trace of the rider's pedal (Fig. 7b of "
+    "Dardanelli et al.)",
     options=Options,
     defaults=Options(trace="", trace_map="", max_gap=0.1, smoothing=0.02),
     cases=cases,

@@ -500,7 +500,7 @@ def truth(par: MotorcycleParameters, options: Options) -> Mapping[str, float]:
 METHOD = Method(
     name="braking-dynamics",
     assembly="motorcycle-brake",
-    summary="transfer function from current to pressure by region (2010, eq. 22, Table 4, Fig. 6)",
+    summary="transfer function from current to pressure by region (Table 4 of Dardanelli et al.)",
     experiment="pressure-step",
     signals={"i": "A", "p_mc": "Pa"},
     options=Options,

@@ -146,7 +146,8 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
 METHOD = Method(
     name="motor-winding",
     assembly="motorcycle-brake",
-    summary="R_m and L_m from voltage steps, also K_e if the shaft turns (2010, eq. 1)",
+    summary="R_m and L_m from voltage steps, also K_e if the shaft turns (eq. (1) of Dardanelli "
+    "et al.)",
     experiment="motor-open-loop",
     signals={"v": "V", "omega": "rad/s", "i": "A"},
     options=Options,

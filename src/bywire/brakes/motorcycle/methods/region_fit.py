@@ -548,7 +548,8 @@ def _in_turn(
         best = _apart(problems, parts)
         notes.append(
             "the two-step fit did not converge: its last iteration changed the values by "
-            f"{change:.2g} of their size. Each step's intervals assume that the other step's "
+            f"{100.0 * change:.2g} % of their size. Each step's intervals assume that the other "
+            "step's "
             "values are exact"
         )
     return best.noted((*notes, *notes_of(best)))

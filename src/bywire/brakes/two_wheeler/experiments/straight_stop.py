@@ -134,7 +134,7 @@ def actuator_effort(run: xr.Dataset, _: StraightStopOptions) -> tuple[Kpi, ...]:
 WHOLE_REAR_STOP = Experiment(
     name="whole-rear-stop",
     assembly="two-wheeler-whole-rear",
-    summary="panic stop with a whole brake by wire at the rear wheel, {p_rear}",
+    summary="panic stop with the complete by-wire rear brake, {p_rear}",
     options=StraightStopOptions,
     defaults=StraightStopOptions(
         v_0=30.0, p_front=40e5, p_rear=40e5, surface="wet-asphalt", duration=0.0
@@ -163,7 +163,7 @@ class BandwidthsOptions(PanicOptions):
     surface: SurfaceName
     """road surface"""
     f_n: Annotated[Nodes, Unit("Hz", 10.0), Field(min_length=1)]
-    """natural frequencies of the pressure loops, one run each"""
+    """natural frequencies of the pressure loops, with one run for each"""
     duration: Duration
     """recording time"""
 

@@ -48,7 +48,7 @@ class RigOptions(ParameterSet):
     cutoff: Frequency
     """cutoff frequency of the low-pass filter for the speed"""
     slowest: AngularSpeed
-    """minimum relative speed of the two motors that counts as motion"""
+    """relative speed of the two motors above which they are considered moving"""
     margin: Duration
     """time to omit at the start and end of each motion"""
     window: Duration

@@ -150,7 +150,7 @@ class Options(ParameterSet):
     """Part of a run-down that counts, filter, and the synthetic noise."""
 
     slowest: AngularSpeed
-    """minimum speed; below it cogging and the Stribeck effect dominate"""
+    """minimum speed, below which cogging and the Stribeck effect dominate"""
     margin: Duration
     """time to omit at the start and end of each coasting phase"""
     window: Duration

@@ -71,7 +71,7 @@ class Demand:
         Whether the speed of the reference enforces the time. Otherwise the pads close as fast as
         in the given brake.
     whole
-        Whether the power of the release also counts, in addition to build-up and hold.
+        Whether the peak power includes the release, in addition to build-up and hold.
     phases
         Disc angles [rad] at which the runs begin.
     """
@@ -353,7 +353,8 @@ _ASSUMPTIONS = (
     "response), does not hold 95 % of the demand, does not release, or presses on an end stop.",
     "Power is the power at the drives' input, including standby, during build-up and hold, and "
     "optionally during the release.",
-    "Each case runs with the disc at four angles, a quarter turn apart, and the worst one counts. "
+    "Each case runs with the disc at four angles, a quarter turn apart, and the worst result is "
+    "used. "
     "The phase of the runout at the stop is random, and holding the moment against the runout "
     "needs power.",
 )
@@ -371,11 +372,11 @@ class Options(ParameterSet):
     t_release: Duration
     """time within which the brake must release after the demand"""
     counted: Literal["build-up-and-hold", "whole-pulse"]
-    """whether the power of the release also counts"""
+    """whether the peak power includes the release"""
     omega_gap: SpeedLimit
     """maximum speed while crossing the gap with the given drive train, scaled like all speeds"""
     mu_B: Coefficients
-    """pad friction coefficients; the worst case counts"""
+    """pad friction coefficients; the worst case determines the result"""
     believed: Literal["known", "as-given"]
     """whether the moment controller uses the true coefficients or the parameter set's"""
     response: Literal["enforced", "as-scaled"]
