@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bywire.authoring import Residual, largest_of_the_last, least_of_the_last
 
 Array = NDArray[np.float64]
-_SPAN = 0.5  # s: time in which a healthy brake reaches a set point
+_SPAN = 1.0  # s: time in which a healthy brake reaches a set point, or releases
 
 
 def _pressure(signals: Mapping[str, Array], par: Any, dt: float) -> Array:
@@ -35,7 +35,7 @@ def _correction(signals: Mapping[str, Array], par: Any, dt: float) -> Array:
 RESIDUALS = (
     Residual(
         "pressure",
-        "measured pressure and the set points of the last 0.5 s",
+        "measured pressure and the set points of the last second",
         "truck-ebs",
         "Pa",
         ("p_ref", "p_meas"),
