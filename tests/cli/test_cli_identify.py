@@ -79,6 +79,7 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
             "frequency=p_mc",
             ("unknown stimulus 'frequency': valid names are p_set, pedal_force, i_set",),
         ),
+        ("Demand=p_set", ("Write --input p_set=Demand",)),
         ("p_set=", ("--input p_set= is not valid. Write STIMULUS=SIGNAL", "p_set=p_ref")),
     ],
 )
