@@ -11,8 +11,8 @@ from typing import Annotated, Any, NamedTuple
 from bywire.authoring import Limited, Signal
 from bywire.control import current_pi
 from bywire.core import ops
-from bywire.plant import adc, h_bridge
-from emb_caliper.elements import ball_screw, floating_caliper, planetary_gear
+from bywire.plant import adc, floating_caliper, h_bridge
+from emb_caliper.elements import ball_screw, planetary_gear
 from emb_caliper.laws import limited_pi
 from emb_caliper.parameters import CaliperBrakeParameters as Par
 

@@ -8,10 +8,9 @@ from typing import Any, ClassVar, TypeVar
 
 from bywire.authoring import Assembly, Bounds, Task
 from bywire.core import ops
-from bywire.plant import end_stop
+from bywire.plant import end_stop, floating_caliper
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
     load_friction,
     planetary_gear,
     rotor,

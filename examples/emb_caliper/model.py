@@ -7,11 +7,10 @@ from types import ModuleType
 from typing import Any, ClassVar, Self
 
 from bywire.authoring import Integral, Part, Role, Shown, Wire
-from bywire.plant import battery_supply, dc_motor, end_stop, h_bridge
+from bywire.plant import battery_supply, dc_motor, end_stop, floating_caliper, h_bridge
 from emb_caliper import ecu
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
     load_friction,
     planetary_gear,
     rotor,

@@ -14,13 +14,13 @@ from bywire.plant import (
     battery_supply,
     dc_motor,
     end_stop,
+    floating_caliper,
     h_bridge,
     inverter,
     pmsm,
 )
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
     load_friction,
     planetary_gear,
     rotor,

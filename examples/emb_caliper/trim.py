@@ -6,10 +6,10 @@ from typing import Any
 
 from bywire.authoring import ParameterError, zeros
 from bywire.core import ops
-from bywire.plant import dc_motor, pmsm
+from bywire.plant import dc_motor, floating_caliper, pmsm
 from emb_caliper import ecu, ecu_pmsm
 from emb_caliper.ecu import travel_per_angle
-from emb_caliper.elements import floating_caliper, rotor
+from emb_caliper.elements import rotor
 from emb_caliper.model import EmbCaliper
 from emb_caliper.models.pmsm import EmbCaliperPmsm
 from emb_caliper.parameters import BrakeParameters, torque_constant

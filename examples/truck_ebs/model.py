@@ -1,4 +1,4 @@
-"""The brake at a wheel: reservoir, relay valve, chamber, rod and lever, disc, tire and road."""
+"""The brake at a wheel: reservoir, relay valve, chamber, rod, lever, caliper, tire and road."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from bywire.plant import (
     air_volume,
     brake_chamber,
     end_stop,
+    floating_caliper,
+    lever,
     relay_valve,
     road_wheel,
 )
@@ -25,7 +27,7 @@ def _vehicle(label: str, returns: Any = "") -> Role:
 
 
 class TruckEbs(Corner[Par, ecu.Memory]):
-    """Two dry frictions: of the rod, and of the disc at the wheel."""
+    """Two dry frictions: of rod and lever, and of the disc at the wheel."""
 
     name: ClassVar[str] = "truck-ebs"
     Memory: ClassVar = ecu.Memory
@@ -45,15 +47,15 @@ class TruckEbs(Corner[Par, ecu.Memory]):
     volume = Part(air_volume)
     chamber = Part(brake_chamber)
     rod = Part(push_rod, loss="E_rod")
-    E_friction = Integral("J", "dry friction of the rod", role=Role("sink", "dry friction"))
-    pads = Part(end_stop, work="W_pads", loss="E_pads")
+    lever = Part(lever)
+    E_friction = Integral("J", "friction of rod and lever", role=Role("sink", "dry friction"))
+    caliper = Part(floating_caliper, output=("F_cl",), work="W_caliper", loss="E_caliper")
     stop = Part(end_stop, work="W_stop", loss="E_stop", which="retracted")
     turning = Part(road_wheel, par="wheel", outside=True)
     E_brake = Integral("J", "disc brake and rolling resistance", role=_vehicle("brake"))
     E_wheel = Shown("J", "energy of the wheel", role=_vehicle("wheel", "any"))
 
     p = Wire("Pa", "chamber pressure", 4e5)
-    F_cl = Shown("N", "clamp force", 5e4)
     torque = Shown("N*m", "brake torque", 5e3)
 
     def wheel(self, w: Self) -> WheelSpeed:
@@ -79,10 +81,14 @@ class TruckEbs(Corner[Par, ecu.Memory]):
         w.volume.u = air_volume.Input(into.mdot - out.mdot, into.H - out.H, room.V, room.V_rate)
         w.chamber.u = brake_chamber.Input(w.rod.x.x, w.rod.x.v, w.p)
         force = brake_chamber.output(w.chamber.u, w.chamber.par).F
-        beyond = 10.0 * w.chamber.par.x_table[-1]  # each has a single stop within the travel
-        w.pads.u = end_stop.Input(w.rod.x.x, w.rod.x.v, -beyond, par.disc.gap * par.rod.i)
+        beyond = 10.0 * w.chamber.par.x_table[-1]  # only the retracted stop is within the travel
         w.stop.u = end_stop.Input(w.rod.x.x, w.rod.x.v, 0.0, beyond)
-        load = end_stop.load(w.pads.f) + end_stop.load(w.stop.f)
+        # The travel of the pads is affine in the rod's travel, with a slope at the predicted one.
+        slope = lever.slope(w.rod.xe.x, w.lever.par)
+        y = lever.travel(w.rod.xe.x, w.lever.par) + slope * (w.rod.x.x - w.rod.xe.x)
+        w.caliper.u = floating_caliper.Input(y, slope * w.rod.x.v)
+        w.lever.u = lever.Input(w.rod.xe.x, w.rod.x.v, w.caliper.f.F_cl)
+        load = lever.load(w.lever.u, w.lever.par) + end_stop.load(w.stop.f)
         w.rod.u = push_rod.Input(force, load, 0.0)
         road = self.tyre_torque(w)
         w.turning.u = road_wheel.Input(road / w.turning.par.r, 0.0)
@@ -91,13 +97,13 @@ class TruckEbs(Corner[Par, ecu.Memory]):
         """Return the bounds of both frictions; at rest, each is between them."""
         rolling = road_wheel.rolling_resistance(w.N_x, w.turning.par)
         most = self.brake_torque(w) + rolling
-        rod = w.rod.par.F_fr
+        rod = lever.friction(w.lever.u, w.lever.par)
         return ((-rod, rod), (-most, most))
 
     def brake_torque(self, w: Self) -> float:
         """Return the largest torque of the disc brake [N m]."""
         disc = w.par.disc
-        torque: float = 2.0 * disc.mu * disc.r_eff * w.rod.par.i * w.pads.f.far
+        torque: float = 2.0 * disc.mu * disc.r_eff * w.caliper.f.F_cl
         return torque
 
     def power(self, w: Self) -> dict[str, float]:
@@ -113,7 +119,6 @@ class TruckEbs(Corner[Par, ecu.Memory]):
         """Return the recorded signals other than states, wires and losses."""
         return {
             **super().record(w),
-            "F_cl": w.rod.par.i * w.pads.f.far,
             "torque": -w.reaction[1],
             "E_wheel": road_wheel.energy(w.turning.x, w.turning.par),
         }

@@ -19,5 +19,5 @@ PANELS = Panels(
 SLIDERS = Sliders(
     "truck-ebs",
     ("truck-ebs",),
-    ("feed.C", "relay.tau", "chamber.V_0", "disc.gap", "disc.mu", "ecu.T_bus"),
+    ("feed.C", "relay.tau", "chamber.V_0", "caliper.clearance", "disc.mu", "ecu.T_bus"),
 )

@@ -8,11 +8,10 @@ from typing import Any, ClassVar, Self
 
 from bywire.authoring import Bounds, Integral, Part, Role, Shown, Wire
 from bywire.core import ops
-from bywire.plant import angle_sensor, battery_supply, end_stop, inverter, pmsm
+from bywire.plant import angle_sensor, battery_supply, end_stop, floating_caliper, inverter, pmsm
 from emb_caliper import ecu, ecu_pmsm
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
     load_friction,
     planetary_gear,
     rotor,

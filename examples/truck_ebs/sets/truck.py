@@ -34,15 +34,22 @@ NUMBERS = {
     "chamber.k_s": chosen(8e3, "no source"),
     "rod.m": chosen(1.5, "rod, diaphragm and lever"),
     "rod.d": chosen(200.0, "little"),
-    "rod.F_fr": chosen(60.0, "about 1 % of the force"),
-    "rod.i": chosen(15.0, _CLASS),
-    "pads.k_stop": derived(
-        lambda par: 4e7 / (par.rod.i * par.rod.i), "40 kN/mm at the pads, at the rod"
+    "lever.law": chosen("constant", "the eccentric of a disc brake hardly changes its ratio"),
+    "lever.i": chosen(15.0, _CLASS),
+    "lever.L": chosen(0.08, "no source (law turning)"),
+    "lever.phi_0": chosen(0.25, "perpendicular in the middle of the stroke (law turning)"),
+    "lever.F_fr": chosen(60.0, "about 1 % of the force"),
+    "lever.mu": chosen(0.04, "efficiency of about 0.96, no source"),
+    "caliper.k_1": chosen(4e7, _CLASS),
+    "caliper.k_2": derived(
+        lambda par: par.caliper.k_1 / 2e-3, "stiffness doubles within 2 mm of compression"
     ),
-    "pads.tau_stop": chosen(2e-4, "no rebound"),
+    "caliper.k_3": chosen(0.0, "no source"),
+    "caliper.n_max": chosen(3e-3, "beyond the largest clamp force"),
+    "caliper.tau": chosen(2e-4, "no rebound"),
+    "caliper.clearance": chosen(8e-4, _CLASS),
     "stop.k_stop": chosen(2e7, "steel on steel"),
     "stop.tau_stop": chosen(2e-4, "no rebound"),
-    "disc.gap": chosen(8e-4, _CLASS),
     "disc.mu": chosen(0.35, _CLASS),
     "disc.r_eff": chosen(0.165, _CLASS),
     "wheel.J": chosen(12.0, "twin tires not included"),

@@ -202,6 +202,7 @@ def tallies(items: Iterable[Item]) -> dict[str, Tally]:
 
 # --- Reproductions
 
+_ADVICE = "For your own work"
 _THREADS = 4  # more would only wait for the Python interpreter
 
 
@@ -313,6 +314,8 @@ class Reproduction(Answer):
         The tolerances with their reasons.
     sets
         Titles of the parameter sets, by the text after ``@`` in an item's id.
+    advice
+        What the agreements and disagreements mean for users of the model.
     """
 
     source: str
@@ -321,6 +324,7 @@ class Reproduction(Answer):
     causes: tuple[RootCause, ...] = ()
     allowances: tuple[Allowance, ...] = ()
     sets: Mapping[str, str] = field(default_factory=dict)
+    advice: str = ""
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -372,6 +376,7 @@ class Reproduction(Answer):
         """Return a document of contradictions, then statements with computed numbers by part."""
         hint = f"bywire reproduce {self.source} --out FOLDER"
         counts = Listing(self._counts(), "Verdicts by parameter set")
+        advice: list[str | Block] = [Listing([self.advice], _ADVICE), ""] if self.advice else []
         contradictions = self.contradictions
         return Document(
             f"Reproduction of {self.source}",
@@ -383,6 +388,7 @@ class Reproduction(Answer):
                 "",
                 counts,
                 "",
+                *advice,
                 *self._tables(),
                 f"Report with notes, tolerances and figures: {hint}",
             ],
@@ -417,7 +423,7 @@ class Reproduction(Answer):
         return lines
 
     def _sections(self, counts: Listing) -> list[Section]:
-        sections = []
+        sections = [Section(_ADVICE, [Paragraph(self.advice)])] if self.advice else []
         for each in self.contradictions:
             table = [TableBlock(statements(each.items))] if each.items else []
             title = f"{each.title}: {each.counted(self._judged)}"

@@ -99,6 +99,10 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         """Return the torques that the front and the rear brake can hold [N m], >= 0."""
         raise NotImplementedError
 
+    def motor_torques(self, w: Self) -> tuple[float, float]:
+        """Return the braking torques of motors at both wheels [N m]; by default, there is none."""
+        return 0.0, 0.0
+
     def wire(self, w: Self) -> None:
         """Connect wheels, tires and body."""
         super().wire(w)
@@ -112,8 +116,9 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         w.front_tyre.u, w.rear_tyre.u = front._replace(N=w.N_f), rear._replace(N=w.N_r)
         w.F_f = tyre.output(w.front_tyre.x, w.front_tyre.u, w.front_tyre.par).F
         w.F_r = tyre.output(w.rear_tyre.x, w.rear_tyre.u, w.rear_tyre.par).F
-        w.front.u = road_wheel.Input(w.F_f, 0.0)
-        w.rear.u = road_wheel.Input(w.F_r, 0.0)
+        front_motor, rear_motor = self.motor_torques(w)
+        w.front.u = road_wheel.Input(w.F_f, 0.0 - front_motor)
+        w.rear.u = road_wheel.Input(w.F_r, 0.0 - rear_motor)
         w.body.u = two_wheeler_body.Input(
             w.F_f + w.F_r, slope.sine, slope.cosine, w.ground.f.support
         )

@@ -287,12 +287,17 @@ def _stuck(q: Quoted) -> RootCause:
     )
 
 
+_ADVICE = (
+    "Use an estimate only together with its interval, and do not use one whose interval contains "
+    "zero or that is at its bound. Measure the parameters under 'Not determined' on your own "
+    "brake, because the paper's figures and tables do not determine them."
+)
 SOURCE = Source(
     name=NAME,
     summary="the motorcycle brake as measured: all parameters from Table 4, Figs. 5 to 7 and "
     "Table 3",
     reproduce=lambda progress: reproduced(
-        Reproduction(NAME, CITATION, allowances=allowances(), sets=TITLES),
+        Reproduction(NAME, CITATION, allowances=allowances(), sets=TITLES, advice=_ADVICE),
         Runs(progress),
         {"statements": statements, "estimate": estimates, "beyond": beyond},
         lambda items: causes_of(
