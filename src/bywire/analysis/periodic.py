@@ -595,8 +595,8 @@ def dithered_loop(
     Parameters
     ----------
     loop, par, value
-        The loop and its operating point. Converters and encoders count as ideal, because rounded
-        values have no derivative.
+        The loop and its operating point. Converters and encoders are treated as ideal, because
+        rounded values have no derivative.
     step
         As in `periodic_model`.
 

@@ -516,7 +516,7 @@ def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
 
 
 def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
-    """Reject a class with numbers that have no unit, which would count as structural choices.
+    """Reject a class with numbers that have no unit, which would be treated as structural choices.
 
     Raises
     ------

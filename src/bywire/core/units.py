@@ -28,9 +28,9 @@ _LONGEST = 100  # characters; keeps patterns fast for hostile text
 _WORDS = {"1": "a pure number", "delta_degC": "a temperature difference in K"}
 ICE = 273.15
 """0 degC [K]"""
-# Elsewhere, a radian counts as a pure number: N*m equals N*m/rad. If this rule applied here, 60 rpm
-# would become 6.28 Hz, 1 would become 57 degrees, and 2 mm would become 2 mm/rad although the user
-# may mean 2 mm/rev.
+# Elsewhere, a radian is treated as a pure number: N*m equals N*m/rad. If this rule applied here,
+# 60 rpm would become 6.28 Hz, 1 would become 57 degrees, and 2 mm would become 2 mm/rad although
+# the user may mean 2 mm/rev.
 _NO_MATTER_OF_RAD = ("Hz", "rad/s", "rad", "1", "m/rad")
 
 

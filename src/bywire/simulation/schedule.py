@@ -185,17 +185,17 @@ def _divisor(period: float, step: float) -> float:
 # --- The state vector
 
 COUNTERS = 3  # at the end of the state vector, see `Layout`
-CAP = 8  # passes through one substep before it counts as unsettled
+CAP = 8  # passes through one substep before it is treated as unsettled
 JUMP, FLAG, DOUBT = 4, 5, 6  # indices among the results of a pass, after x, d, r, q
 # Search for the time at which a substep is cut: maximum number of attempts; remaining velocity at
 # which the search ends, or is close enough for linear interpolation, relative to the substep's
 # change of velocity; and minimum fraction of a part before and after the cut.
 ATTEMPTS, CLOSE, NEAR, EDGE = 12, 1e-12, 1e-9, 1e-9
-STILL = 1e-9  # fraction of its initial value below which another velocity also counts as zero
+STILL = 1e-9  # fraction of its initial value below which another velocity is also treated as zero
 
 
 def most_cuts(velocities: int) -> int:
-    """Return the number of parts after which a substep counts as unsettled.
+    """Return the number of parts after which a substep is treated as unsettled.
 
     Each velocity with dry friction may reverse, and may reverse again after other velocities have
     reversed.

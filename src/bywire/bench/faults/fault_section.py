@@ -25,7 +25,7 @@ Share = Annotated[float, Unit("1", 0.5), Field(gt=0, le=1, allow_inf_nan=False)]
 STAGES = 50  # number of steps in which a parameter follows a ramp
 MOST = 10_000
 """maximum number of an intermittent fault's periods in a run"""
-_EDGE = 1e-9  # s, tolerance within which a time counts as reached
+_EDGE = 1e-9  # s, tolerance within which a time is treated as reached
 
 
 class Course(ParameterSet):
