@@ -71,6 +71,17 @@ BANNED = (
     Banned(r"\bagree[sd]? within\b", "they agree within 1 %", "agree to within"),
     Banned(r"\bType for example\b", "Type for example --at 2", "For example, type"),
     Banned(r"\bsooner or later\b", "one tick sooner or later", "earlier or later"),
+    Banned(
+        r"\b(?:integral|derivative|proportional) parts?\b",
+        "integral part of the current PI",
+        "integral term",
+    ),
+    Banned(r"\bcounts? as\b", "a slow shaft counts as locked", "is considered, is treated as"),
+    Banned(r"\bof the order of \d", "of the order of 65 %", "on the order of"),
+    Banned(r"\bturnover of\b", "2 J of a turnover of 9 J", "of 9 J transferred"),
+    Banned(r"\bcounts? fully\b", "dither counts fully", "is fully included"),
+    Banned(r"\bjudged statements?\b", "3 of 9 judged statements", "judged values"),
+    Banned(),
     Banned(r"\bfused? products?\b", "without fused products", "fused multiply-add"),
     Banned(
         r"\b(?:agree[sd]?|match(?:es|ed)?) [^.;:|]{1,60}(?<!\bto )\bwithin \d",
