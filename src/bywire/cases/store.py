@@ -2,7 +2,7 @@
 
 Large pieces are files in a folder with a record of the work (`PieceFolder`). Small pieces are
 lines of one file (`PieceLines`). A killed process loses its unfinished pieces. A damaged piece
-counts as missing and is recomputed.
+is treated as missing and is recomputed.
 """
 
 from __future__ import annotations

@@ -370,7 +370,8 @@ def _strongest(trial: Trial, run: Run) -> list[str]:
     for name in known:
         try:
             value = _moved(run, name, INFLUENCE)
-            run.par.replace({name: value})
+            for number in (value, _moved(run, name, -DIFFERENCE)):  # a value may be at its limit
+                run.par.replace({name: number})
         except ParameterError:
             continue
         cases[name] = value

@@ -87,6 +87,17 @@ def flow(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Flow:
     return K * drop / ops.sqrt(ops.sqrt(drop * drop + p_cr * p_cr))
 
 
+def pressure_drop(q: Flow, par: Parameters, fluid: brake_fluid.Parameters) -> Pressure:
+    r"""Return the pressure drop of a flow, the inverse of `flow` for the open orifice.
+
+    .. math:: \Delta p = \frac{q}{K} \sqrt{\tfrac{1}{2} (z + \sqrt{z^2 + 4 p_{cr}^2})},
+        \quad z = (q/K)^2
+    """
+    ratio, p_cr = q / coefficient(par, fluid), critical_pressure(par, fluid)
+    z = ratio * ratio
+    return ratio * ops.sqrt(0.5 * (z + ops.sqrt(z * z + 4.0 * p_cr * p_cr)))
+
+
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Loss:
     """Return the heat from the flow, including released compression energy, >= 0."""
     h = brake_fluid.flow_energy

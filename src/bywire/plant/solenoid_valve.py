@@ -102,6 +102,14 @@ def delayed(
     )
 
 
+def lift(
+    on: Switched, par: Parameters
+) -> Annotated[float, Signal("m", "lift at a constant current", 1e-4)]:
+    """Return the lift at rest, with the solenoid energized (1) or not (0)."""
+    opened = 1.0 - on if par.unpowered == "open" else on
+    return par.lift * (par.low + (par.high - par.low) * opened)
+
+
 def mass(par: Parameters) -> Annotated[float, Signal("s", "time constant", 1e-3)]:
     """Return the factor of the lift's derivative, the time constant."""
     return par.tau
@@ -111,8 +119,7 @@ def balance(
     x: State, u: Input, par: Parameters
 ) -> Annotated[float, Signal("m", "distance to the new lift", 1e-4)]:
     r"""Return the distance of the armature from its new lift, :math:`\tau \dot x = x_{new} - x`."""
-    opened = 1.0 - u.on if par.unpowered == "open" else u.on
-    return par.lift * (par.low + (par.high - par.low) * opened) - x.x
+    return lift(u.on, par) - x.x
 
 
 def opening(x: State, par: Parameters) -> orifice.Opening:
