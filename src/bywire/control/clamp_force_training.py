@@ -224,6 +224,14 @@ def _expected(x: State) -> Torques:
     return x.fit_s * x.h_s_2 + x.fit_C * x.h_C_2
 
 
+def _noise(
+    u: Input, of: estimator.Parameters, par: Parameters
+) -> Annotated[float, Signal("N**2*m**2", "variance of the load torque", 1e-4)]:
+    """Return the variance of a sample of the load torque."""
+    inertial = of.spread_J * u.T_J
+    return par.sigma_T * par.sigma_T + inertial * inertial
+
+
 def _touched(x: State, u: Input, of: estimator.Parameters, par: Parameters) -> State:
     r"""Return the state with a new contact angle if the pads touch before the fit expects it.
 
@@ -234,10 +242,11 @@ def _touched(x: State, u: Input, of: estimator.Parameters, par: Parameters) -> S
     """
     per_force = of.gamma + u.way * x.fit_G
     slope = per_force * x.fit_s * of.gamma * of.k_1
-    limit = CONTACT * par.sigma_T + of.spread_J * ops.fabs(u.T_J)
+    doubt = CONTACT * CONTACT * _noise(u, of, par)
     fresh = ops.where(-x.h_t_2 < 0.5 * slope, u.valid, 0.0)
     pressing = ops.where(u.way > 0.5, fresh, 0.0)
-    touches = ops.where(u.T_L - _expected(x) > limit, pressing, 0.0) > 0.5
+    excess = ops.fmax(u.T_L - _expected(x), 0.0)
+    touches = ops.where(excess * excess > doubt, pressing, 0.0) > 0.5
     e = u.T_L - x.fit_C * x.h_C_2
     back = 2.0 * u.omega / of.k + e / slope
     w_t, _, _ = _uncertainties(of, par)
@@ -270,8 +279,7 @@ def _corrected(
     v_s = x.P_ts * h_t + x.P_ss * h_s + x.P_sC * h_C + x.P_sG * h_G
     v_C = x.P_tC * h_t + x.P_sC * h_s + x.P_CC * h_C + x.P_CG * h_G
     v_G = x.P_tG * h_t + x.P_sG * h_s + x.P_CG * h_C + x.P_GG * h_G
-    inertial = of.spread_J * u.T_J
-    R = 2.0 / (of.k * T) * (par.sigma_T * par.sigma_T + inertial * inertial)
+    R = 2.0 / (of.k * T) * _noise(u, of, par)
     known = h_t * v_t + h_s * v_s + h_C * v_C + h_G * v_G
     S = known + R * ops.fmax(e * e / (OUTLIER * OUTLIER * (known + R)), 1.0)
     slope = (of.gamma + u.way * x.fit_G) * x.fit_s * of.gamma * of.k_1
