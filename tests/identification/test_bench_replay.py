@@ -146,7 +146,7 @@ def test_figures_by_hand() -> None:
     flat = pair.assign(measured=pair["measured"] * 0.0)
     still = {k.name: k for k in fit_figures(flat, Segment("all", 0.0, 2.0))}
     assert np.isnan(still["vaf"].value)
-    assert "does not move" in still["vaf"].note
+    assert "does not change" in still["vaf"].note
 
 
 def test_tolerances_by_segment_and_signal() -> None:
