@@ -130,7 +130,7 @@ def test_name_of_a_file_is_the_default(tmp_path):
         ({"overrides": {"motor.R_m": 10**5000}}, ParameterError, "300 digits or more"),
         ({"overrides": {"motor": {}}}, UnknownNameError, "unknown parameter 'motor'"),
         ({"overrides": {"options.p_to": 1}}, UnknownNameError, "unknown parameter"),
-        ({"options": {"p_to": -1}}, ParameterError, "must be > 0 bar"),
+        ({"options": {"p_to": -1}}, ParameterError, "must be > 0 Pa"),
         ({"step": 0}, StepError, "simulation.step = 0 ms"),
         ({"step": -1e-6}, StepError, "must be >= 1e-06 ms"),
         ({"step": math.inf}, ParameterError, "any finite number in s"),

@@ -186,7 +186,7 @@ class PieceFolder(ABC):
     def _unwritable(self, path: Path, error: OSError) -> FileError:
         return FileError(
             f"cannot write {path}: {error.strerror or error}. Free some space, and resume the "
-            f"{self.NOUN}. Finished pieces are saved",
+            f"{self.NOUN}. Finished work is saved",
             name=str(path),
         )
 

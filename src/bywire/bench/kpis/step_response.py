@@ -300,7 +300,7 @@ def _why_still(response: Response) -> Undefined | None:
     if not response.most <= _DEAD * height:
         return None
     return Undefined(
-        f"the response does not move: it changes by at most {response.most:.3g} in a step of "
+        f"the response hardly changes: it varies by at most {response.most:.3g} in a step of "
         f"{height:.3g} {{level}}",
         is_open=True,
     )

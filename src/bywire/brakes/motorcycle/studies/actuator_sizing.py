@@ -366,7 +366,7 @@ class Options(ParameterSet):
     bandwidth: Frequency
     """required bandwidth: frequency of the sine, or bandwidth of the step response"""
     p_peak: Pressure
-    """maximum pressure: peak of the sine or end of the step"""
+    """maximum pressure: peak of the sine or final value of the step"""
     amplitude: Pressure
     """sine amplitude"""
     p_from: Pressure

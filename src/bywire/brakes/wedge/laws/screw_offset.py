@@ -1,4 +1,4 @@
-"""Offset between the two screws, which squeeze the wedge without free play or push it together."""
+"""Offset between the two screws, which squeeze the wedge without free play or push it jointly."""
 
 from __future__ import annotations
 
