@@ -26,7 +26,7 @@ from one_box.rigs.corner import OneBoxCorner, OneBoxCornerParameters, rolling
 
 RidingSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
 Demand = Annotated[float, Unit("Pa", 1e7), Field(gt=0, allow_inf_nan=False)]
-SLOW = 2.5
+SLOW = 4.0
 """speed [m/s] below which the wheel may lock"""
 _SETTLED = 0.5  # s until the first cycle is over
 _NO_CYCLE = "anti-lock control does not release the wheel twice"

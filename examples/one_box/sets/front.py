@@ -14,6 +14,7 @@ _CAR = "front corner of a mid-size car"
 _CLASS = "typical of this class"
 _NONE = "no public source"
 _ASSUMED = "same as the brake"
+_SOUGHT = "rounded result of a search for short stops on five surfaces"
 _ROAD = "dry asphalt, Burckhardt's values for a car tire"
 _STRETCH = {"c1": 1.2801, "c2": 23.99, "c3": 0.52, "B": 9.121, "C": 1.841, "D": 1.17, "E": 0.7324}
 
@@ -195,7 +196,9 @@ CORNER = {
     "antilock.T_s": chosen(1e-3, "as fast as the valves"),
     "antilock.abs": chosen("rules", "pulses of the valves need thresholds"),
     "antilock.sees": chosen("estimated", "as on the road"),
-    "antilock.M_rate": chosen(2e4, "800 bar/s, as fast as the inlet valve fills the caliper"),
+    "antilock.M_rate": chosen(
+        1.84e4, "760 bar/s, about as fast as the inlet valve fills the caliper"
+    ),
     "antilock.M_least": derived(
         lambda par: 2.5 * BAR * brake_disc.torque_per_pressure(par.disc),
         "above the accumulator's pressure",
@@ -223,23 +226,23 @@ CORNER = {
     "antilock.slip.J_hat": derived(lambda par: par.wheel.J, _ASSUMED),
     "antilock.slip.r_hat": derived(lambda par: par.wheel.r, _ASSUMED),
     "antilock.slip.k_hat": derived(lambda par: brake_disc.torque_per_pressure(par.disc), _ASSUMED),
-    "antilock.rules.slip_keep": chosen(0.345, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.slip_dump": chosen(0.51, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.slip_back": chosen(0.224, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.t_lead": chosen(0.133, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.a_hold": chosen(13.7, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.t_hold": chosen(0.0265, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.t_most": chosen(0.47, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.dump": chosen(100.0, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.depth": chosen(0.935, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.back": chosen(1.015, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.t_step": chosen(0.0183, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.step": chosen(0.0425, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.growth": chosen(1.12, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.tau_a": chosen(0.0055, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.tau_p": chosen(0.025, "tuned for 10 Hz pressure loops"),
-    "antilock.rules.v_off": chosen(2.0, "same as slip control"),
-    "antilock.rules.v_fall": chosen(4.85, "tuned for 10 Hz pressure loops"),
+    "antilock.rules.slip_keep": chosen(0.265, _SOUGHT),
+    "antilock.rules.slip_dump": chosen(0.54, _SOUGHT),
+    "antilock.rules.slip_back": chosen(0.23, _SOUGHT),
+    "antilock.rules.t_lead": chosen(0.123, _SOUGHT),
+    "antilock.rules.a_hold": chosen(14.4, _SOUGHT),
+    "antilock.rules.t_hold": chosen(0.0205, _SOUGHT),
+    "antilock.rules.t_most": chosen(0.57, _SOUGHT),
+    "antilock.rules.dump": chosen(70.0, _SOUGHT),
+    "antilock.rules.depth": chosen(0.975, _SOUGHT),
+    "antilock.rules.back": chosen(1.08, _SOUGHT),
+    "antilock.rules.t_step": chosen(0.0165, _SOUGHT),
+    "antilock.rules.step": chosen(0.049, _SOUGHT),
+    "antilock.rules.growth": chosen(1.31, _SOUGHT),
+    "antilock.rules.tau_a": chosen(0.0065, _SOUGHT),
+    "antilock.rules.tau_p": chosen(0.023, _SOUGHT),
+    "antilock.rules.v_off": chosen(3.5, "the pulses of the encoder are rare below"),
+    "antilock.rules.v_fall": chosen(6.0, "same as slip control"),
     "antilock.valves.K_in": derived(
         lambda par: orifice.coefficient(par.inlet.seat, par.fluid), _ASSUMED
     ),
