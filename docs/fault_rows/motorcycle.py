@@ -39,7 +39,7 @@ PHASE = (
 LATE = (
     "with a delay of five ticks, the current loop is unstable. Its phase "
     "crosses -180 degrees at 44 Hz, where its gain is 1.28. Without dither, "
-    "it oscillates at 41 Hz with 18 A. It amplifies the 50 Hz dither by a factor of 4.6 to 13.5 "
+    "it oscillates at 41 Hz with 18 A. It amplifies the 50 Hz dither by a factor of 4.6, to 13.5 "
     "A, in addition to 3.6 A at 41 Hz. Near the resonance, the result depends strongly on the "
     "gain. With 10 % more or less integral gain, the ripple is 12.1 or 8.1 A. With 17 % less, it"
     " is 7 A. "
@@ -291,7 +291,7 @@ def _controller() -> list[Row]:
             "bar",
             ends(one("p_set.lost")),
         ),
-        Row("gear.jammed", "pressure does not change", 37.0, "bar", ends(one("gear.jammed"))),
+        Row("gear.jammed", "pressure after the fault", 37.0, "bar", ends(one("gear.jammed"))),
     ]
 
 
@@ -332,7 +332,7 @@ def _fluid() -> list[Row]:
         ),
         Row(
             "caliper.heated 5 ml",
-            "drag pressure after 30 K",
+            "drag pressure after heating by 30 K",
             (7.0, 13.0),
             "bar",
             lambda: 30.0 * expansion(5e-6, 6.0),
@@ -347,7 +347,7 @@ def _fluid() -> list[Row]:
         ),
         Row(
             "caliper.heated 64 ml",
-            "pressure rise of all fluid, compliant line",
+            "pressure rise with all fluid heated, compliant line",
             3.1,
             "bar/K",
             lambda: expansion(64e-6, 1.0),

@@ -31,7 +31,7 @@ class Memory(NamedTuple):
     omega_meas: Annotated[float, Signal("rad/s", "measured motor speed", 50.0)]
     i_ref: Annotated[float, Signal("A", "current set point", 20.0, set_point_of="i")]
     duty: Annotated[float, Signal("1", "duty cycle", 0.3), Limited("ecu.current.D_max")]
-    pi_integral: Annotated[float, Signal("1", "integral part of the current PI", 0.3)]
+    pi_integral: Annotated[float, Signal("1", "integral term of the current PI", 0.3)]
     sat_current: Annotated[float, Signal("1", "current demand saturated")]
     sat_duty: Annotated[float, Signal("1", "duty cycle saturated")]
 

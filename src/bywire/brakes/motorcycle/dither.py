@@ -295,7 +295,7 @@ def area_ratios(par: Par, designs: Sequence[tuple[float, float]]) -> list[float]
 Figures = Mapping[str, Array]
 
 OVERCOMES = ("stuck", "band")
-"""figures that decrease with the amplitude: below their limits friction counts as overcome"""
+"""figures that decrease with the amplitude: below their limits friction is treated as overcome"""
 COSTS = ("ripple_caliper", "current_share", "duty_share")
 """figures that increase with the amplitude"""
 
