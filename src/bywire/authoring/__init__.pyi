@@ -33,8 +33,8 @@ from bywire.bench.stated import StatedFigure as StatedFigure
 from bywire.bench.stated import StatedLevel as StatedLevel
 from bywire.bench.stated import StatedRange as StatedRange
 from bywire.bench.stimulus import Stimulus as Stimulus
-from bywire.campaigns.residual import DeclaredCampaign as DeclaredCampaign
 from bywire.campaigns.residual import NEVER as NEVER
+from bywire.campaigns.residual import DeclaredCampaign as DeclaredCampaign
 from bywire.campaigns.residual import Residual as Residual
 from bywire.campaigns.residual import largest_of_the_last as largest_of_the_last
 from bywire.campaigns.residual import least_of_the_last as least_of_the_last
