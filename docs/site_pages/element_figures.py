@@ -96,7 +96,7 @@ FIGURES: dict[str, Declared] = {
         "gas_volume", "p", (0.0, 20 * BAR), {"par.air": "entrained", "par.V_air": 1e-7}
     ),
     "caliper": Course("x.p", 0.05, {"u.q": 3e-6}),
-    "caliper_piston": Course("x.v", 0.01, {"u.q": 1e-5}, lines=("par.d", (500.0, 1e3, 2e3))),
+    "caliper_piston": Course("x.v", 0.002, {"u.q": 1e-5}, lines=("par.d", (1e3, 2e3, 4e3))),
     "check_valve": Curve("flow", "u.p_a", (-5 * BAR, 10 * BAR), _FLUID),
     "clearance_adjuster": Course("x.taken", 0.2, {"u.turning": 1.0, "par.law": "screw"}),
     "corner_body": Course("x.v", 3.0, {"u.F": 3000.0, "x.v": 20.0}),
@@ -168,7 +168,7 @@ FIGURES: dict[str, Declared] = {
     ),
     "pressure_sensor": Curve("reading", "p", (-10 * BAR, 100 * BAR)),
     "proportional_valve": Curve(
-        "held_pressure", "i", (0.85, 2.5), {}, ("par.G", (50 * BAR, 60 * BAR, 70 * BAR))
+        "held_pressure", "i", (1.05, 2.5), {}, ("par.G", (50 * BAR, 60 * BAR, 70 * BAR))
     ),
     "rack": Curve("output.load", "u.force", (-1000.0, 1000.0)),
     "relay_valve": Curve("output.feed", "x.s", (-1.0, 1.0)),
@@ -311,7 +311,7 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "delivery.seat.Re_cr": 100.0,
         "delivery.p_crack": 0.5 * BAR,
     },
-    "seal_rollback": {"k": 6e5, "z_max": 0.1 * MM},
+    "seal_rollback": {"k": 6e5, "z_max": 0.06 * MM},
     "shaft": {"J": 1e-3, "d": 2e-3},
     "solenoid_armature": {
         "unpowered": "closed",
