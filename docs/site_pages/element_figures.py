@@ -46,7 +46,7 @@ _FLUID = {f"fluid.{name}": value for name, value in {"nu": 12e-6, "rho": 1070.0}
 
 FIGURES: dict[str, Declared] = {
     "abs_modulator": Course("x.hold", 0.1, {"u.close": lambda t: 1.0 if t < 0.05 else 0.0}),
-    "accumulator": Curve("pressure", "x.V", (0.0, 4e-6)),
+    "accumulator": Curve("pressure", "x.V", (-0.2e-6, 3.505e-6), _FLUID),
     "adc": Curve("rounded", "reading", (0.0, 0.01), {"par.law": "quantized"}),
     "adhesion": Curve(
         "adhesion",
@@ -96,6 +96,7 @@ FIGURES: dict[str, Declared] = {
         "gas_volume", "p", (0.0, 20 * BAR), {"par.air": "entrained", "par.V_air": 1e-7}
     ),
     "caliper": Course("x.p", 0.05, {"u.q": 3e-6}),
+    "caliper_piston": Course("x.v", 0.002, {"u.q": 1e-5}, lines=("par.d", (1e3, 2e3, 4e3))),
     "check_valve": Curve("flow", "u.p_a", (-5 * BAR, 10 * BAR), _FLUID),
     "clearance_adjuster": Course("x.taken", 0.2, {"u.turning": 1.0, "par.law": "screw"}),
     "corner_body": Course("x.v", 3.0, {"u.F": 3000.0, "x.v": 20.0}),
@@ -166,9 +167,23 @@ FIGURES: dict[str, Declared] = {
         "x.p", 0.3, {"u.p_ref": 40 * BAR}, lines=("par.f_n", (5.0, 10.0, 20.0))
     ),
     "pressure_sensor": Curve("reading", "p", (-10 * BAR, 100 * BAR)),
+    "proportional_valve": Curve(
+        "held_pressure", "i", (1.05, 2.5), {}, ("par.G", (50 * BAR, 60 * BAR, 70 * BAR))
+    ),
     "rack": Curve("output.load", "u.force", (-1000.0, 1000.0)),
     "relay_valve": Curve("output.feed", "x.s", (-1.0, 1.0)),
     "reservoir_port": Curve("output.G", "u.x", (0.0, 2 * MM), {"par.law": "dead-stroke"}),
+    "return_pump": Course(
+        "output.q_d",
+        0.04,
+        {
+            "u.theta": lambda t: 100.0 * math.pi * t,
+            "u.omega": 100.0 * math.pi,
+            "u.p_d": 60 * BAR,
+            **_FLUID,
+        },
+        lines=("u.p_s", (1.5 * BAR, -0.812 * BAR)),
+    ),
     "road": Curve(
         "share", "x", (0.0, 60.0), {"par.x_change": 20.0, "par.x_back": 45.0, "par.ramp": 2.0}
     ),
@@ -177,12 +192,19 @@ FIGURES: dict[str, Declared] = {
     "seal_friction": Curve(
         "output.T_p", "u.omega", (0.0, 20.0), {}, ("u.p", (0.0, 20 * BAR, 40 * BAR))
     ),
+    "seal_rollback": Course("output.F_seal", 3.5, {"u.v": _strokes}, "u.v"),
     "servo_motor": Course("x.omega", 0.1, {"u.v": 10.0}),
     "shaft": Course("x.omega", 1.0, {"u.torque": 0.1}),
     "shaft_encoder": Curve(
         "reading", "theta", (0.0, 0.05), {"par.law": "quantized", "par.counts": 800.0}
     ),
+    "solenoid_armature": Curve(
+        "output.F_m", "x.x", (0.0, 0.25 * MM), _FLUID, ("x.psi", (2e-3, 3e-3, 4e-3))
+    ),
     "stiffening_caliper": Curve("volume", "x.p", (0.0, 100 * BAR)),
+    "tandem_master_cylinder": Curve(
+        "output.F_spring_1", "x.x_1", (0.0, 15 * MM), {}, ("x.x_2", (0.0, 5 * MM, 10 * MM))
+    ),
     "traction_battery": Curve(
         "charging_limit", "x.soc", (0.0, 1.0), {}, ("par.T", (263.15, 273.15, 298.15))
     ),
@@ -204,10 +226,11 @@ FIGURES: dict[str, Declared] = {
 
 VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set contains
     "abs_modulator": {"tau_hold": 0.008, "tau_vent": 0.008},
-    "accumulator": {"p_0": 1.5 * BAR, "k": BAR / 1e-6, "V_max": 3.5e-6},
+    "accumulator": {"p_0": 1.5 * BAR, "k": BAR / 1e-6, "V_max": 3.5e-6, "c_stop": 4e-15},
     "adhesion": {"curve": "burckhardt"},
     "backlash": {"i": 1.0, "b": 10e-3, "k": 300.0, "tau": 1e-4},
     "ball_ramp": {"r": 20 * MM, "alpha": 3 * DEG, "mu": 0.0},
+    "caliper_piston": {"A_pd": 19.6e-4, "V_0": 1e-5, "m": 0.3, "d": 1e3, "G_leak": 0.0},
     "check_valve": {
         "seat.d": 1.2 * MM,
         "seat.C_d": 0.65,
@@ -256,9 +279,67 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
     },
     "pedal_simulator": {"k_1": 12e3, "k_2": 40e3, "x_1": 8 * MM, "d_in": 200.0, "d_out": 400.0},
     "planetary_gear": {"z_sun": 18.0, "z_ring": 72.0, "eta": 0.95},
+    "proportional_valve": {
+        "seat.d": 0.5 * MM,
+        "seat.C_d": 0.65,
+        "seat.Re_cr": 100.0,
+        "alpha": 0.8,
+        "lift": 0.2 * MM,
+        "m": 5e-3,
+        "k_s": 2e3,
+        "F_s0": 1.0,
+        "d": 2.0,
+        "F_h": 0.02,
+        "G": 60 * BAR,
+    },
     "rack": {"r_p": 15 * MM, "eta": 0.9},
+    "return_pump": {
+        "d_p": 6.5 * MM,
+        "e": 1 * MM,
+        "phase": 0.5 * math.pi,
+        "V_dead": 2e-8,
+        "V_gas": 0.0,
+        "tau": 5e-5,
+        "G_back": 0.0,
+        "p_max": 250 * BAR,
+        "suction.seat.d": 2.5 * MM,
+        "suction.seat.C_d": 0.65,
+        "suction.seat.Re_cr": 100.0,
+        "suction.p_crack": 0.2 * BAR,
+        "delivery.seat.d": 1.2 * MM,
+        "delivery.seat.C_d": 0.65,
+        "delivery.seat.Re_cr": 100.0,
+        "delivery.p_crack": 0.5 * BAR,
+    },
+    "seal_rollback": {"k": 6e5, "z_max": 0.06 * MM},
     "shaft": {"J": 1e-3, "d": 2e-3},
+    "solenoid_armature": {
+        "unpowered": "closed",
+        "seat.d": 0.6 * MM,
+        "seat.C_d": 0.65,
+        "seat.Re_cr": 100.0,
+        "alpha": 0.8,
+        "travel": 0.25 * MM,
+        "g_0": 0.4 * MM,
+        "k_m": 1.2e-7,
+        "L_0": 1e-3,
+        "R": 4.5,
+        "m": 3e-3,
+        "d": 1.0,
+        "k": 2e3,
+        "F_s0": 4.0,
+        "F_h": 0.2,
+        "dirt": 0.0,
+    },
     "stiffening_caliper": {"V_1": 0.35e-6, "p_1": 4 * BAR, "c": 0.011e-6 / BAR},
+    "tandem_master_cylinder": {
+        "m_1": 0.2,
+        "m_2": 0.1,
+        "F_s1": 80.0,
+        "k_s1": 4e3,
+        "F_s2": 60.0,
+        "k_s2": 3e3,
+    },
     "traction_battery": {
         "law": "cells",
         "P_max": 25e3,
