@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -11,23 +11,24 @@ from bywire.plant import (
     air,
     air_orifice,
     air_volume,
+    anti_alias_filter,
     brake_chamber,
     end_stop,
+    floating_caliper,
+    lever,
     relay_valve,
     road_wheel,
 )
 from bywire.vehicle import CornerParameters
 from truck_ebs.elements import push_rod
+from truck_ebs.laws import pressure_control
 
-Gap = Annotated[float, Unit("m", 8e-4), Field(ge=0, allow_inf_nan=False)]
 PadFriction = Annotated[float, Unit("1", 0.35), Field(gt=0, lt=1, allow_inf_nan=False)]
 
 
 class DiscParameters(ParameterSet):
-    """Disc brake at the lever."""
+    """Disc and pads of the caliper."""
 
-    gap: Gap
-    """air gap of both pads together"""
     mu: PadFriction
     """friction coefficient of the pads"""
     r_eff: Length
@@ -35,14 +36,24 @@ class DiscParameters(ParameterSet):
 
 
 class EcuParameters(ParameterSet):
-    """Electronic pressure control of the relay valve."""
+    """Electronic pressure control of the relay valve.
 
+    ``control``: with ``"feedforward"``, the control pressure follows the demand, and only the relay
+    valve controls the pressure. With ``"closed-loop"``, the ECU corrects the measured pressure.
+    """
+
+    control: Literal["feedforward", "closed-loop"]
+    """whether the ECU corrects the measured pressure"""
     T_s: Duration
     """sample time"""
     T_bus: TimeConstant
     """time constant of bus, electronics and pilot valve"""
     p_max: Pressure
     """largest control pressure"""
+    p_range: Pressure
+    """gauge pressure at full range of the sensor"""
+    filter: anti_alias_filter.Parameters
+    pressure: pressure_control.Parameters
 
 
 class TruckParameters(ParameterSet):
@@ -57,7 +68,8 @@ class TruckParameters(ParameterSet):
     volume: air_volume.Parameters
     chamber: brake_chamber.Parameters
     rod: push_rod.Parameters
-    pads: end_stop.Parameters
+    lever: lever.Parameters
+    caliper: floating_caliper.Parameters
     stop: end_stop.Parameters
     disc: DiscParameters
     wheel: road_wheel.Parameters
@@ -66,10 +78,12 @@ class TruckParameters(ParameterSet):
 
     @model_validator(mode="after")
     def _chamber_reaches_the_pads(self) -> TruckParameters:
-        reach, needed = self.chamber.x_table[-1], self.disc.gap * self.rod.i
-        if not reach > needed:
+        stroke = self.chamber.x_table[-1]
+        reach, gap = lever.travel(stroke, self.lever), self.caliper.clearance
+        if not reach > gap:
             raise ValueError(
-                f"chamber.x_table ends at {reach:g} m, which must be beyond the travel at which "
-                f"the pads touch, disc.gap rod.i = {needed:g} m"
+                f"chamber.x_table ends at {stroke:g} m, where the pads have moved {reach:.3g} m. "
+                f"They must move farther than caliper.clearance = {gap:g} m. Reduce the clearance "
+                f"or lever.i = {self.lever.i:g}"
             )
         return self

@@ -5,9 +5,9 @@ from collections import deque
 import numpy as np
 import pytest
 
-from bywire.control import blending
+from bywire.control import blending, torque_bus
 from bywire.core.errors import ParameterError
-from bywire.plant import wheel_motor
+from bywire.plant import traction_battery, wheel_motor
 from raising import raises
 
 M, R, A = 400.0, 0.3, 3.0
@@ -15,7 +15,6 @@ TAU_B, T_D, T = 0.060, 0.010, 1e-3
 MOTOR = {
     "T_max": 500.0,
     "P_max": 25e3,
-    "P_bat": 25e3,
     "eta": 1.0,
     "v_1": 15 / 3.6,
     "v_2": 5 / 3.6,
@@ -23,10 +22,13 @@ MOTOR = {
 }
 
 
-def stop(law, **changes):
+LAW = {"category": "B", "rate": 1e5, "t_off": 0.05}
+
+
+def stop(law, P_bat=25e3):
     """Return time, speed, demand, motor torque and friction torque of a stop from 100 km/h."""
-    motor = wheel_motor.Parameters.create(MOTOR | changes)
-    par = blending.Parameters.create({"law": law, "rate": 1e5, "t_off": 0.05})
+    motor = wheel_motor.Parameters.create(MOTOR)
+    par = blending.Parameters.create(LAW | {"law": law})
     x, state, T_b, v = wheel_motor.State(0.0), blending.State(0.0), 0.0, 100 / 3.6
     ticks = round(T_D / T)
     reports, commands = (deque([0.0] * ticks, ticks) for _ in range(2))
@@ -34,14 +36,14 @@ def stop(law, **changes):
     for k in range(12000):
         demand = M * A * R * min(k * T / 0.3, 1.0)
         ahead = v - (x.T + T_b) / (M * R) * (T_D + TAU_B)
-        limits = [wheel_motor.limit(w / R, w, motor) for w in (v, max(ahead, 0.0))]
-        u = blending.Input(demand, *limits, reports[0], 0.0)
+        limits = [wheel_motor.limit(w / R, w, P_bat, motor) for w in (v, max(ahead, 0.0))]
+        u = blending.Input(demand, 0.0, *limits, reports[0], 0.0)
         state, out = blending.output(state, u, T, par)
         delayed = commands[0]
         reports.append(x.T)
         commands.append(out.T_friction)
         rows.append((k * T, v, demand, x.T, T_b))
-        missing = wheel_motor.balance(x, wheel_motor.Input(out.T_motor), motor)
+        missing = wheel_motor.balance(x, wheel_motor.Input(out.T_motor, v / R), motor)
         x = wheel_motor.State(x.T + T * missing / motor.tau)
         T_b += T * (delayed - T_b) / TAU_B
         v -= T * (x.T + T_b) / (M * R)
@@ -83,22 +85,78 @@ def test_a_full_battery_leaves_the_stop_to_the_friction_brake():
     _, _, demand, T_m, T_b = stop("commanded", P_bat=0.0)
     assert np.all(T_m == 0.0)
     assert T_b[5000] == pytest.approx(demand[5000], rel=1e-6)
-    assert (
-        wheel_motor.limit(0.0, 20.0, wheel_motor.Parameters.create(MOTOR | {"P_bat": 0.0})) == 0.0
-    )
+    assert wheel_motor.limit(0.0, 20.0, 0.0, wheel_motor.Parameters.create(MOTOR)) == 0.0
 
 
 def test_slip_control_takes_the_motor_out_within_its_time():
-    par = blending.Parameters.create({"law": "commanded", "rate": 1e5, "t_off": 0.05})
-    state, u = blending.State(300.0), blending.Input(360.0, 300.0, 300.0, 300.0, 1.0)
+    par = blending.Parameters.create(LAW | {"law": "commanded"})
+    state, u = blending.State(300.0), blending.Input(360.0, 0.0, 300.0, 300.0, 300.0, 1.0)
     for _ in range(50):
         state, out = blending.output(state, u, T, par)
     assert out.T_motor == pytest.approx(0.0, abs=1e-9)
     assert out.T_friction == pytest.approx(360.0)
 
 
-def test_blending_needs_a_battery_limit_and_a_fade():
+def test_outside_the_service_brake_the_motor_adds_to_the_friction_demand():
+    par = blending.Parameters.create(LAW | {"category": "A", "law": "reported"})
+    u = blending.Input(360.0, 80.0, 300.0, 300.0, 80.0, 0.0)
+    state, out = blending.output(blending.State(0.0), u, T, par)
+    assert out == (80.0, 360.0)
+    _, within = blending.output(state, u, T, par.replace({"category": "B"}))
+    assert within == (180.0, 360.0)  # 440 N m of both demands, of which 80 N m are reported
+
+
+def test_the_torque_must_fade_at_a_lower_speed():
     with raises(ParameterError, name="v_1", valid="> v_2"):
         wheel_motor.Parameters.create(MOTOR | {"v_1": 1.0})
-    with pytest.raises(ParameterError, match="P_bat"):
-        wheel_motor.Parameters.create({k: v for k, v in MOTOR.items() if k != "P_bat"})
+
+
+# --- Charging limit of the battery
+
+CELLS = {
+    "law": "cells",
+    "P_max": 25e3,
+    "Q": 1.35e5,
+    "V_0": 320.0,
+    "V_1": 410.0,
+    "V_max": 410.0,
+    "R": 0.4,
+    "I_max": 75.0,
+    "T": 298.15,
+    "T_cold": 263.15,
+    "T_warm": 283.15,
+}
+
+
+@pytest.mark.parametrize(
+    ("soc", "changes", "power"),
+    [
+        (1.0, {}, 0.0),  # full
+        (0.9, {}, 22.5 * 410.0),  # by the largest terminal voltage
+        (0.3, {"P_max": 1e6}, 75.0 * (347.0 + 0.4 * 75.0)),  # by the largest current
+        (0.3, {}, 25e3),
+        (0.3, {"T": 273.15}, 37.5 * (347.0 + 0.4 * 37.5)),
+        (0.3, {"T": 253.15}, 0.0),
+        (1.0, {"law": "constant"}, 25e3),
+    ],
+)
+def test_the_charging_limit_follows_from_charge_and_temperature(soc, changes, power):
+    par = traction_battery.Parameters.create(CELLS | changes)
+    limit = traction_battery.charging_limit(traction_battery.State(soc), par)
+    assert limit == pytest.approx(power, rel=1e-12)
+
+
+def test_the_battery_needs_a_finite_limit():
+    with raises(ParameterError, name="P_max", value="inf"):
+        traction_battery.Parameters.create(CELLS | {"P_max": float("inf")})
+    with pytest.raises(ParameterError, match="P_max"):
+        traction_battery.Parameters.create({k: v for k, v in CELLS.items() if k != "P_max"})
+
+
+def test_a_bus_delays_by_whole_sample_times():
+    par = torque_bus.Parameters(T_d=T_D)
+    state, seen = torque_bus.State(*[0.0] * torque_bus.SLOTS), []
+    for k in range(20):
+        state, out = torque_bus.output(state, torque_bus.Input(float(k)), T, par)
+        seen.append(out.T_received)
+    assert seen == pytest.approx([0.0] * 10 + list(range(10)), abs=1e-9)

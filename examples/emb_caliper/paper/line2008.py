@@ -20,7 +20,7 @@ from bywire.authoring import (
     parameters,
     style,
 )
-from emb_caliper.elements import floating_caliper
+from bywire.plant import floating_caliper
 from emb_caliper.experiments.power_off import held_force
 from emb_caliper.paper import facts
 from emb_caliper.sets.emb42v import SOURCE as CITATION

@@ -318,16 +318,11 @@ def set_keeps_its_ranges(par: ParameterSet) -> Iterator[Evidence]:
 
 
 def _says_which(leaf: Leaf, value: float) -> tuple[str, ...]:
-    return leaf.name, str(value)
-
-
-def _says_range(leaf: Leaf, value: float) -> tuple[str, ...]:
-    unit = "" if leaf.unit.symbol == "1" else f" {leaf.unit.symbol}"
-    return f"{value}{unit}", leaf.range_text
+    return leaf.name, leaf.outside_text(value)[0]
 
 
 def _says_both(leaf: Leaf, value: float) -> tuple[str, ...]:
-    return *_says_which(leaf, value), *_says_range(leaf, value)
+    return leaf.name, *leaf.outside_text(value)
 
 
 def refuses_outside(

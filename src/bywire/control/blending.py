@@ -1,4 +1,4 @@
-"""Blending of a regenerating motor with a friction brake, sampled."""
+"""Sampled blending of a regenerating motor with a friction brake."""
 
 from __future__ import annotations
 
@@ -22,11 +22,18 @@ Acting = Annotated[float, Signal("1", "slip control acts", 0.5), Ge(0), Le(1)]
 class Parameters(ParameterSet):
     """Motor first: the friction brake supplies what the motor does not.
 
+    ``category``, as in UN Regulation No. 13-H: with ``"B"``, the motor is part of the service
+    brake, and its torque reduces the friction demand. With ``"A"``, it is not: the motor brakes
+    only with the torque of the released accelerator, in addition to the pedal's whole friction
+    demand.
+
     ``law``: motor torque from which the friction demand follows. With ``"reported"``, it is the
     torque that the motor reports over the bus. With ``"commanded"``, it is the command. With
     ``"predicted"``, it is the motor's limit when the friction brake will have responded.
     """
 
+    category: Literal["A", "B"]
+    """whether the motor is part of the service brake: B, or not: A"""
     law: Literal["reported", "commanded", "predicted"]
     """motor torque that the friction brake complements"""
     rate: TorqueRate
@@ -42,9 +49,10 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Demand, limits of the motor now and ahead, reported torque, and slip control."""
+    """Demands, limits of the motor now and ahead, reported torque, and slip control."""
 
     T_demand: Demand
+    T_coast: Annotated[float, Signal("N*m", "torque of the released accelerator", 50.0), Ge(0)]
     limit: Annotated[float, Signal("N*m", "limit of the motor", 300.0), Ge(0)]
     limit_ahead: Annotated[float, Signal("N*m", "predicted limit of the motor", 300.0), Ge(0)]
     T_reported: Torque
@@ -61,7 +69,11 @@ class Output(NamedTuple):
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
     r"""Advance the law by one sample.
 
-    .. math:: T_m = \min(T_{demand}, T_{limit}), \quad T_f = \max(T_{demand} - T_{seen}, 0)
+    .. math:: T_m = \min(T_{set}, T_{limit}), \quad T_f = \max(T_{set} - T_{seen}, 0)
+
+    In category B, the set point :math:`T_{set}` is the sum of both demands. In category A, it is
+    the demand of the released accelerator, and :math:`T_f` is the pedal's demand. Corners: the
+    motor's limit, the largest rate, no friction demand, and the switch of slip control.
 
     Notes
     -----
@@ -74,8 +86,10 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     References
     ----------
     D. Kade et al., US patent 5,511,859, 1996: friction demand from the reported motor torque.
+    UN Regulation No. 13-H, section 2: electric regenerative braking systems of categories A and B.
     """
-    free = ops.clip(ops.fmin(u.T_demand, u.limit), x.T_m - T * par.rate, x.T_m + T * par.rate)
+    wanted = u.T_coast if par.category == "A" else u.T_demand + u.T_coast
+    free = ops.clip(ops.fmin(wanted, u.limit), x.T_m - T * par.rate, x.T_m + T * par.rate)
     # Slip control takes the motor out, because it is slower to modulate than the friction brake.
     out = ops.fmax(x.T_m - T / par.t_off * ops.fmax(u.limit, x.T_m), 0.0)
     command = ops.where(u.slip > 0.5, out, free)
@@ -84,6 +98,6 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     elif par.law == "commanded":
         seen = command
     else:
-        seen = ops.where(u.slip > 0.5, command, ops.fmin(u.T_demand, u.limit_ahead))
-    friction = ops.fmax(u.T_demand - seen, 0.0)
+        seen = ops.where(u.slip > 0.5, command, ops.fmin(wanted, u.limit_ahead))
+    friction = u.T_demand if par.category == "A" else ops.fmax(wanted - seen, 0.0)
     return State(T_m=command), Output(T_motor=command, T_friction=friction)

@@ -68,8 +68,8 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Integral parts, and the field-weakening current."""
 
-    z_d: Annotated[float, Signal("V", "integral part, along the magnets", 1.0)]
-    z_q: Annotated[float, Signal("V", "integral part, across the magnets", 1.0)]
+    z_d: Annotated[float, Signal("V", "integral term, along the magnets", 1.0)]
+    z_q: Annotated[float, Signal("V", "integral term, across the magnets", 1.0)]
     i_fw: Annotated[float, Signal("A", "field-weakening current", 1.0)]
 
 
@@ -230,7 +230,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
         v_d = k_p e_d + z_d - \omega_e L_q i_q, \quad
         v_q = k_p e_q + z_q + \omega_e (L_d i_d + \psi)
 
-    A voltage above the limit keeps its direction. The integral parts follow the limited voltage.
+    A voltage above the limit keeps its direction. The integral terms follow the limited voltage.
     The voltage then gets a lead angle: the rotation of the rotor until the middle of the sample in
     which the inverter applies the voltage.
 

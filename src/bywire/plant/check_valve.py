@@ -49,6 +49,11 @@ def flow(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> orifice.Fl
     return orifice.flow(orifice.Input(p_a=drop, p_b=0.0 * drop, opening=1.0), par.seat, fluid)
 
 
+def pressure_drop(q: orifice.Flow, par: Parameters, fluid: brake_fluid.Parameters) -> Pressure:
+    """Return the pressure drop of a flow > 0, which includes the cracking pressure."""
+    return par.p_crack + orifice.pressure_drop(q, par.seat, fluid)
+
+
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> orifice.Loss:
     """Return the heat from the flow through seat and spring, >= 0."""
     h = brake_fluid.flow_energy

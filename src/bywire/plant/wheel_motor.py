@@ -1,9 +1,10 @@
-"""Motor at a wheel that brakes and recovers energy, within the limits of motor and battery."""
+"""Wheel motor that brakes and recovers energy within the limits of the motor and the battery."""
 
 from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from annotated_types import Ge
 from pydantic import Field, model_validator
 
 from bywire.core import ops
@@ -14,14 +15,21 @@ from bywire.core.signals import Role, Signal
 
 MotorTorque = Annotated[float, Unit("N*m", 500.0), Field(gt=0, allow_inf_nan=False)]
 MotorPower = Annotated[float, Unit("W", 25e3), Field(gt=0, allow_inf_nan=False)]
-ChargingPower = Annotated[float, Unit("W", 25e3), Field(ge=0, allow_inf_nan=False)]
 FadeSpeed = Annotated[float, Unit("m/s", 3.0), Field(ge=0, allow_inf_nan=False)]
 Torque = Annotated[float, Signal("N*m", "braking torque of the motor", 300.0)]
 WheelSpeed = Annotated[float, Signal("rad/s", "wheel speed", 60.0)]
 Recovered = Annotated[
-    float, Signal("W", "recovered power", role=Role("sink", "recovered", returns="any"))
+    float,
+    Signal("W", "recovered power", role=Role("sink", "recovered", returns="taken", book="vehicle")),
 ]
-Loss = Annotated[float, Signal("W", "loss of motor and inverter", role=Role("sink", "drive loss"))]
+Loss = Annotated[
+    float,
+    Signal(
+        "W",
+        "loss of motor and inverter",
+        role=Role("sink", "motor and inverter", returns="taken", book="vehicle"),
+    ),
+]
 
 
 class Parameters(ParameterSet):
@@ -31,8 +39,6 @@ class Parameters(ParameterSet):
     """largest torque at the wheel"""
     P_max: MotorPower
     """largest power of the motor at the wheel"""
-    P_bat: ChargingPower
-    """largest charging power of the battery; 0 if it is full"""
     eta: Fraction
     """efficiency from the wheel to the battery"""
     v_1: FadeSpeed
@@ -49,10 +55,7 @@ class Parameters(ParameterSet):
         return self
 
 
-FAULTS = (
-    ParameterFault("battery-full", "the battery accepts no power", ("P_bat",), 0.0),
-    ParameterFault("weak", "derated motor", ("T_max", "P_max"), 0.5),
-)
+FAULTS = (ParameterFault("weak", "derated motor", ("T_max", "P_max"), 0.5),)
 
 
 class State(NamedTuple):
@@ -62,9 +65,10 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Commanded torque."""
+    """Commanded torque, and speed of the wheel."""
 
     T_ref: Torque
+    omega: WheelSpeed
 
 
 def mass(x: State, par: Parameters) -> Annotated[float, Signal("s", "time constant", 1e-2)]:
@@ -80,7 +84,10 @@ def balance(
 
 
 def limit(
-    omega: WheelSpeed, v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)], par: Parameters
+    omega: WheelSpeed,
+    v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)],
+    P_bat: Annotated[float, Signal("W", "largest charging power of the battery", 25e3), Ge(0)],
+    par: Parameters,
 ) -> Torque:
     r"""Return the largest braking torque at a speed.
 
@@ -90,7 +97,7 @@ def limit(
 
     It has kinks where the smallest of the limits changes, and at both ends of the fade.
     """
-    power = ops.fmin(par.P_max, par.P_bat / par.eta)
+    power = ops.fmin(par.P_max, P_bat / par.eta)
     least = 1e-9 * par.P_max  # a full battery at standstill has no limit by power, but no torque
     at_speed = ops.fmax(ops.fmax(par.T_max * ops.fabs(omega), power), least)
     torque = par.T_max * power / at_speed
@@ -98,11 +105,14 @@ def limit(
     return torque * fade
 
 
-def recovered_power(x: State, omega: WheelSpeed, par: Parameters) -> Recovered:
-    r"""Return the power into the battery, :math:`\eta T \omega`."""
-    return par.eta * x.T * omega
+def recovered_power(x: State, u: Input, par: Parameters) -> Recovered:
+    r"""Return the power at the battery's terminals, :math:`\eta T \omega`."""
+    return par.eta * x.T * u.omega
 
 
-def power_loss(x: State, omega: WheelSpeed, par: Parameters) -> Loss:
-    """Return the loss of motor and inverter: signed, because it follows the braking power."""
-    return (1.0 - par.eta) * x.T * omega
+def power_loss(x: State, u: Input, par: Parameters) -> Loss:
+    r"""Return the loss of motor and inverter, :math:`(1 - \eta) T \omega`.
+
+    It is signed like the braking power, so a wheel that rolls back on its tire returns a little.
+    """
+    return (1.0 - par.eta) * x.T * u.omega

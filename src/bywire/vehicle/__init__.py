@@ -1,5 +1,7 @@
 """Vehicles with any brake: bodies, slip control, ideal stops, and animations."""
 
+from bywire.vehicle import regeneration
+from bywire.vehicle.blended_stop import Blended, blended_stop
 from bywire.vehicle.corner import (
     Corner,
     CornerParameters,
@@ -9,6 +11,8 @@ from bywire.vehicle.corner import (
     rolling_states,
     warm_disc,
 )
+from bywire.vehicle.ideal_stop import ideal_corner_distance
+from bywire.vehicle.regeneration import RegeneratingCorner, RegeneratingTwoWheeler
 from bywire.vehicle.two_wheeler import (
     HotBrakes,
     TwoWheeler,
@@ -18,15 +22,21 @@ from bywire.vehicle.two_wheeler import (
 )
 
 __all__ = [
+    "Blended",
     "Corner",
     "CornerParameters",
     "HotBrakes",
     "HotCorner",
     "HotCornerParameters",
+    "RegeneratingCorner",
+    "RegeneratingTwoWheeler",
     "TwoWheeler",
     "VehicleParameters",
     "WheelSpeed",
+    "blended_stop",
     "cold_start",
+    "ideal_corner_distance",
+    "regeneration",
     "rolling_start",
     "rolling_states",
     "warm_disc",

@@ -59,8 +59,12 @@ class Corner(Assembly[ParT, MemoryT]):
         """Return the speed of the wheel."""
         raise NotImplementedError
 
+    def motor_torque(self, w: Self) -> float:
+        """Return the braking torque of a motor at the wheel [N m]; by default, there is none."""
+        return 0.0
+
     def tyre_torque(self, w: Self) -> float:
-        """Wire body and tire, and return the torque of the road on the wheel [N m]."""
+        """Wire body and tire, and return the torque of road and motor on the wheel [N m]."""
         par: CornerParameters = w.par.corner  # type: ignore[attr-defined]
         omega = self.wheel(w)
         ground = road.surface(w.corner.xe.s, par.road)
@@ -71,7 +75,7 @@ class Corner(Assembly[ParT, MemoryT]):
         w.tyre.u = tyre.Input(w.corner.x.v, omega.x * par.r, w.N_x, *ground, limits.mu, limits.u)
         w.F_x = tyre.output(w.tyre.x, w.tyre.u, par.tyre).F
         w.corner.u = corner_body.Input(w.F_x, slope.sine)
-        return par.r * w.F_x
+        return par.r * w.F_x - self.motor_torque(w)
 
     def power(self, w: Self) -> dict[str, float]:
         """Return the powers of the vehicle's energy balance."""

@@ -62,14 +62,16 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     front_tyre = Part(tyre, par="vehicle.front_tyre", suffix="_f", which="front")
     rear_tyre = Part(tyre, par="vehicle.rear_tyre", suffix="_r", which="rear")
     road = Part(road, par="vehicle.road")
-    E_brake_f = Integral("J", "heat of the front brake", role=_sink("front brake"))
-    E_brake_r = Integral("J", "heat of the rear brake", role=_sink("rear brake"))
+    E_brake_f = Integral("J", "heat dissipated by the front brake", role=_sink("front brake"))
+    E_brake_r = Integral("J", "heat dissipated by the rear brake", role=_sink("rear brake"))
     E_roll = Integral("J", "rolling resistance", role=_sink("rolling resistance"))
     E_tyre_f = Integral("J", "front tire: slip and deflection", role=_tyre("front tire"))
     E_tyre_r = Integral("J", "rear tire: slip and deflection", role=_tyre("rear tire"))
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
     W_pitch = Integral(
-        "J", "work of the braking forces on pitching", role=Role("source", "pitching", book=BOOK)
+        "J",
+        "work of the braking forces on the pitch motion",
+        role=Role("source", "pitching", book=BOOK),
     )
     t_locked_f = Integral("s", "time during which the front wheel is locked")
     t_locked_r = Integral("s", "time during which the rear wheel is locked")
@@ -86,8 +88,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     slip_r = Shown("1", "rear braking slip")
     sliding_f = Shown("1", "front tire slides")
     sliding_r = Shown("1", "rear tire slides")
-    mu_f = Shown("1", "front braking force relative to load")
-    mu_r = Shown("1", "rear braking force relative to load")
+    mu_f = Shown("1", "front braking force relative to the wheel load")
+    mu_r = Shown("1", "rear braking force relative to the wheel load")
     a = Shown("m/s**2", "deceleration", 10.0)
     E_vehicle = Shown(
         "J", "energy of the vehicle", role=Role("sink", "vehicle", book=BOOK, returns="any")
@@ -96,6 +98,10 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     def brake_torques(self, w: Self) -> tuple[float, float]:
         """Return the torques that the front and the rear brake can hold [N m], >= 0."""
         raise NotImplementedError
+
+    def motor_torques(self, w: Self) -> tuple[float, float]:
+        """Return the braking torques of motors at both wheels [N m]; by default, there is none."""
+        return 0.0, 0.0
 
     def wire(self, w: Self) -> None:
         """Connect wheels, tires and body."""
@@ -110,8 +116,9 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         w.front_tyre.u, w.rear_tyre.u = front._replace(N=w.N_f), rear._replace(N=w.N_r)
         w.F_f = tyre.output(w.front_tyre.x, w.front_tyre.u, w.front_tyre.par).F
         w.F_r = tyre.output(w.rear_tyre.x, w.rear_tyre.u, w.rear_tyre.par).F
-        w.front.u = road_wheel.Input(w.F_f, 0.0)
-        w.rear.u = road_wheel.Input(w.F_r, 0.0)
+        front_motor, rear_motor = self.motor_torques(w)
+        w.front.u = road_wheel.Input(w.F_f, 0.0 - front_motor)
+        w.rear.u = road_wheel.Input(w.F_r, 0.0 - rear_motor)
         w.body.u = two_wheeler_body.Input(
             w.F_f + w.F_r, slope.sine, slope.cosine, w.ground.f.support
         )

@@ -36,7 +36,7 @@ def part(runs: Runs) -> Part:
     exhibit = Exhibit(
         "power-off-hold",
         lambda: stacked(run),
-        "Power off at 500 Nm. Only the ripple due to runout remains.",
+        "Power off at 500 N·m. Only the ripple due to runout remains.",
     )
     return Part("Holding", text, tuple(items), (exhibit,), {"power-off-hold": run})
 
@@ -102,7 +102,7 @@ def _standing(runs: Runs) -> list[Item]:
             "hold.standing.stick",
             "1",
             shares["stick"],
-            "the same ratio if the pad sticks to the stopped disc (our other reading)",
+            "the same ratio if the pad sticks to the stopped disc (our other interpretation)",
         ),
         found(
             "hold.force_held",
@@ -135,7 +135,7 @@ def _together(runs: Runs) -> list[Item]:
             "hold.together",
             FACTS["together"],
             above["scheduled"] / above["preload"],
-            note=f"500 Nm at mu_B = {_AWAY:g}: {above['scheduled']:.3g} W if the motors work "
+            note=f"500 N·m at mu_B = {_AWAY:g}: {above['scheduled']:.3g} W if the motors work "
             f"together, {above['preload']:.3g} W with preload",
         ),
     ]
