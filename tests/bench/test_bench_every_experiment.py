@@ -40,7 +40,7 @@ FEWER = {  # experiments with many runs, which are run unchanged in the tests of
 }
 LARGE = (
     "bandwidths",
-    "blended-stop",
+    "corner-blending",
     "corner-panic",
     "corner-stop",
     "disc-stop",

@@ -14,7 +14,7 @@ from run_once import run_once
 
 def stop(**changes):
     overrides = {key.replace("__", "."): value for key, value in changes.items()}
-    return bywire.run("blended-stop", overrides, estimate_error=False)
+    return bywire.run("corner-blending", overrides, estimate_error=False)
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from bywire.brakes.wedge.rigs.electric_corner import ElectricCorner, at_speed
 from bywire.vehicle.blended_stop import Blended, blended_stop
 
-BLENDED_STOP = blended_stop(
-    "blended-stop",
+CORNER_BLENDING = blended_stop(
+    "corner-blending",
     Blended(
         ElectricCorner,
         at_speed,
