@@ -6,7 +6,7 @@ from bywire.authoring import LineRole, Panel, Panels, Sliders, Trace
 
 PANELS = Panels(
     "truck-ebs",
-    ("truck-ebs",),
+    ("truck-ebs", "truck-brake-rig"),
     (
         Panel("pressure", (Trace("p"), Trace("p_ref", LineRole.SET_POINT)), height=1.8),
         Panel("opening", (Trace("feed"), Trace("exhaust", LineRole.SECOND))),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -11,6 +11,7 @@ from bywire.plant import (
     air,
     air_orifice,
     air_volume,
+    anti_alias_filter,
     brake_chamber,
     end_stop,
     floating_caliper,
@@ -20,6 +21,7 @@ from bywire.plant import (
 )
 from bywire.vehicle import CornerParameters
 from truck_ebs.elements import push_rod
+from truck_ebs.laws import pressure_control
 
 PadFriction = Annotated[float, Unit("1", 0.35), Field(gt=0, lt=1, allow_inf_nan=False)]
 
@@ -34,14 +36,24 @@ class DiscParameters(ParameterSet):
 
 
 class EcuParameters(ParameterSet):
-    """Electronic pressure control of the relay valve."""
+    """Electronic pressure control of the relay valve.
 
+    ``control``: with ``"feedforward"``, the control pressure follows the demand, and only the relay
+    valve controls the pressure. With ``"closed-loop"``, the ECU corrects the measured pressure.
+    """
+
+    control: Literal["feedforward", "closed-loop"]
+    """whether the ECU corrects the measured pressure"""
     T_s: Duration
     """sample time"""
     T_bus: TimeConstant
     """time constant of bus, electronics and pilot valve"""
     p_max: Pressure
     """largest control pressure"""
+    p_range: Pressure
+    """gauge pressure at full range of the sensor"""
+    filter: anti_alias_filter.Parameters
+    pressure: pressure_control.Parameters
 
 
 class TruckParameters(ParameterSet):

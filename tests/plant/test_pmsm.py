@@ -16,11 +16,22 @@ TRACTION = {"p": 3.0, "R": 18e-3, "L_d": 0.37e-3, "L_q": 1.2e-3, "psi": 66e-3}
 IRON = {"iron": "off", "c_h": 0.0, "c_e": 0.0}
 T = 1e-4
 SUBSTEPS = 10
-POWER_STAGE = {"law": "ideal", "f_s": 10e3, "t_d": 1e-6, "V_f": 0.0, "i_th": 0.05}
+POWER_STAGE = {
+    "law": "ideal",
+    "f_s": 10e3,
+    "t_d": 1e-6,
+    "V_f": 0.0,
+    "i_th": 0.05,
+    "gates": 1.0,
+    "i_off": 1.0,
+}
+
+
+NO_MAP = {f"map.{name}": () for name in ("i_d", "i_q", "psi_d", "psi_q")}
 
 
 def motor(values):
-    return pmsm.Parameters.create(values | IRON)
+    return pmsm.Parameters.create({"law": "linear"} | NO_MAP | IRON | values)
 
 
 def law(values, **changes):
@@ -142,7 +153,8 @@ def test_without_lead_the_delay_turns_the_voltage(omega, overshoot):
 def test_the_largest_current_at_a_voltage(omega, i):
     V, par = inverter.largest_voltage(24.0), motor(SERVO)
     u = pmsm.Input(-par.p * omega * par.L_q * i, 0.0, omega)
-    v_q = -pmsm.balance(pmsm.State(0.0, i), u, par).i_q
+    x = pmsm.State(0.0, i)
+    v_q = -pmsm.balance(x, u, par).i_q
     assert math.hypot(u.v_d, v_q) == pytest.approx(V, rel=1e-3)
 
 

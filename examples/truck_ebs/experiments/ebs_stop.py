@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from bywire.authoring import (
     Case,
-    Duration,
     Experiment,
     Figures,
     Kpi,
-    ParameterSet,
     Recordings,
+    Unit,
 )
-from truck_ebs.experiments.ebs_response import Demand, RidingSpeed, demanded
+from truck_ebs.experiments.ebs_response import DemandOptions, demanded
 from truck_ebs.model import TruckEbs, rolling
 from truck_ebs.parameters import TruckParameters
 
+RidingSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
 FIGURES = Figures(
     undefined="the vehicle does not stop within the recording",
     stopping_distance=("m", "Distance from the demand to standstill."),
@@ -28,15 +30,11 @@ FIGURES = Figures(
 )
 
 
-class Options(ParameterSet):
+class Options(DemandOptions):
     """The stop."""
 
     v_0: RidingSpeed
     """initial speed"""
-    p_brake: Demand
-    """demanded pressure"""
-    duration: Duration
-    """recording time"""
 
 
 def cases(par: TruckParameters, options: Options, _: object = None) -> tuple[Case, ...]:
