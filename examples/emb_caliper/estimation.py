@@ -81,8 +81,9 @@ def fed_back(m: Any, par: Any) -> Any:
         return m._replace(F_used=m.F_hat)
     state, out = force_monitor.output(
         _part(force_monitor.State, m),
-        force_monitor.Input(m.F_meas, m.F_hat),
+        force_monitor.Input(m.F_meas, m.F_hat, m.T_load, m.started),
         ecu.T_force,
+        ecu.estimator,
         ecu.monitor,
     )
     return m._replace(**state._asdict(), F_used=out.F)

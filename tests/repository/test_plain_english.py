@@ -81,7 +81,6 @@ BANNED = (
     Banned(r"\bturnover of\b", "2 J of a turnover of 9 J", "of 9 J transferred"),
     Banned(r"\bcounts? fully\b", "dither counts fully", "is fully included"),
     Banned(r"\bjudged statements?\b", "3 of 9 judged statements", "judged values"),
-    Banned(),
     Banned(r"\bfused? products?\b", "without fused products", "fused multiply-add"),
     Banned(
         r"\b(?:agree[sd]?|match(?:es|ed)?) [^.;:|]{1,60}(?<!\bto )\bwithin \d",

@@ -1,9 +1,13 @@
-"""Choice of the clamp force that the ECU controls: the load cell's reading, or the estimate.
+r"""Choice of the clamp force that the ECU controls: the load cell's reading, or the estimate.
 
-The monitor compares both. If they differ by more than a limit for some time, the estimate takes
-over, because the load cell can fail and the angle sensor also commutates the motor. The load cell
-takes over again if both have agreed within a smaller limit, under load, for a longer time. Without
-load, a lost sensor also reads zero, so agreement there proves nothing.
+If both differ by more than a limit, the load torque of the motor decides which one is wrong. At
+rest and in motion, it lies within the friction of the torque that the clamp force causes,
+
+.. math:: |T_L - \gamma F| \le (1 + \sigma) (C + G F) + T_m
+
+If this excludes the load cell's reading but not the estimate for some time, the estimate takes
+over. The load cell takes over again if both have agreed within a smaller limit, under load, for a
+longer time. Without load, a lost load cell also reads zero, so agreement there proves nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +17,8 @@ from typing import Annotated, NamedTuple
 from annotated_types import Gt
 from pydantic import Field, model_validator
 
-from bywire.authoring import Duration, ParameterSet, Signal, Unit
+from bywire.authoring import Duration, ParameterSet, Signal, Torque, Unit
+from bywire.control import clamp_force_estimator as estimator
 from bywire.core import ops
 
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
@@ -34,6 +39,10 @@ class Parameters(ParameterSet):
     """estimated force above which agreement counts"""
     t_close: Duration
     """uninterrupted time of agreement after which the load cell takes over"""
+    spread: Annotated[float, Unit("1", 0.5), Field(ge=0, allow_inf_nan=False)]
+    """relative uncertainty of the friction"""
+    T_margin: Torque
+    """uncertainty of the load torque"""
 
     @model_validator(mode="after")
     def _has_hysteresis(self) -> Parameters:
@@ -46,7 +55,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Source in use, and the times of disagreement and agreement."""
+    """Source in use, and the times for which the cell was wrong, and both agreed."""
 
     on_estimate: Annotated[float, Signal("1", "force control uses the estimate")]
     t_disagree: Elapsed
@@ -54,10 +63,12 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Both forces."""
+    """Both forces, and the load torque."""
 
     F_meas: Annotated[float, Signal("N", "measured clamp force", 1e4)]
     F_hat: Annotated[float, Signal("N", "estimated clamp force", 1e4)]
+    T_L: Annotated[float, Signal("N*m", "filtered load torque", 0.5)]
+    started: Annotated[float, Signal("1", "the estimator has started")]
 
 
 class Output(NamedTuple):
@@ -66,10 +77,27 @@ class Output(NamedTuple):
     F: Annotated[float, Signal("N", "clamp force for control", 1e4)]
 
 
-def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
+def possible(
+    F: Annotated[float, Signal("N", "clamp force", 1e4)],
+    T_L: Annotated[float, Signal("N*m", "filtered load torque", 0.5)],
+    of: estimator.Parameters,
+    par: Parameters,
+) -> Annotated[float, Signal("1", "the load torque is possible with this clamp force")]:
+    """Return 1 if friction explains the difference between load torque and clamp force, or 0."""
+    friction = (1.0 + par.spread) * (of.C_hat + of.G_hat * ops.fmax(F, 0.0))
+    apart = ops.fabs(T_L - of.gamma * F)
+    return ops.where(apart < friction + par.T_margin, 1.0, 0.0)
+
+
+def output(
+    x: State, u: Input, T: SampleTime, of: estimator.Parameters, par: Parameters
+) -> tuple[State, Output]:
     """Advance the monitor by one sample."""
     apart = ops.fabs(u.F_meas - u.F_hat)
-    disagree = ops.where(apart > par.F_apart, x.t_disagree + T, 0.0)
+    cell_is_wrong = possible(u.F_hat, u.T_L, of, par) - possible(u.F_meas, u.T_L, of, par) > 0.5
+    wrong = ops.where(cell_is_wrong, u.started, 0.0) > 0.5
+    differs = ops.where(apart > par.F_apart, x.t_disagree + T, 0.0)
+    disagree = ops.where(wrong, differs, 0.0)
     same = ops.where(apart < par.F_close, x.t_agree + T, 0.0)
     agree = ops.where(u.F_hat > par.F_loaded, same, x.t_agree)
     held = ops.where(agree >= par.t_close, 0.0, x.on_estimate)

@@ -131,6 +131,8 @@ _ESTIMATE = {
     "ecu.monitor.F_close": chosen(1e3, "hysteresis"),
     "ecu.monitor.F_loaded": chosen(5e3, "a lost sensor is obvious there"),
     "ecu.monitor.t_close": chosen(0.5, "longer than a disturbance"),
+    "ecu.monitor.spread": chosen(0.5, "more than the friction changes"),
+    "ecu.monitor.T_margin": chosen(0.05, "lag of the filter in fast steps"),
 }
 _ECU = _ESTIMATE | {
     "ecu.T_force": chosen(1e-3, "common rate of chassis controllers"),

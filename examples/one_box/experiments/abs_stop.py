@@ -86,7 +86,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     run = recordings["run"]
     t, v = run["time"].values, run["v_x"].values
     still = np.flatnonzero((v <= 1e-3) & (t > 0.0))
-    if not still.size:
+    if not still.size or not float(run["s"][still[0]]) > 0.0:
         return FIGURES(**dict.fromkeys(FIGURES.units, math.nan))
     until = int(still[0])
     stop = run.isel(time=slice(0, until + 1))
@@ -159,5 +159,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     kpis=FIGURES.units,
-    figures=("time-traces", "energy-balance"),
+    figures=("time-traces", "slip-cycle", "energy-balance"),
 )

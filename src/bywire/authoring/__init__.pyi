@@ -33,10 +33,12 @@ from bywire.bench.stated import StatedFigure as StatedFigure
 from bywire.bench.stated import StatedLevel as StatedLevel
 from bywire.bench.stated import StatedRange as StatedRange
 from bywire.bench.stimulus import Stimulus as Stimulus
+from bywire.campaigns.residual import NEVER as NEVER
 from bywire.campaigns.residual import DeclaredCampaign as DeclaredCampaign
 from bywire.campaigns.residual import Residual as Residual
 from bywire.campaigns.residual import largest_of_the_last as largest_of_the_last
 from bywire.campaigns.residual import least_of_the_last as least_of_the_last
+from bywire.campaigns.residual import mean_of_the_last as mean_of_the_last
 from bywire.core import quantities as quantities
 from bywire.core import signals as signals
 from bywire.core import validity as validity

@@ -73,7 +73,7 @@ class Parameters(ParameterSet):
     T_wet: Temperature
     """boiling point of fluid with 3.7 % water at atmospheric pressure"""
     T_most: Temperature
-    """disc temperature up to which these values are valid"""
+    """disc temperature up to which the thermal model is valid"""
 
     @model_validator(mode="after")
     def _fades_upward(self) -> Parameters:

@@ -150,7 +150,9 @@ def _whole(period: float, step: float, name: str) -> int:
     rest = abs(count * step - period)
     rounding = _REST * step + 4.0 * math.ulp(period)
     if count < 1 or rest > min(_TOLERANCE * period, rounding):
-        unit = written_unit(getattr(step, "text", ""), "s")  # a user who wrote us reads us
+        # The error uses the unit in which the user wrote the step or the interval.
+        texts = (getattr(each, "text", "") for each in (step, period))
+        unit = next(filter(None, (written_unit(text, "s") for text in texts)), "")
         value, valid = shown(step, "s", unit), shown(_divisor(period, step), "s", unit, digits=15)
         raise StepError(
             f"step = {value} does not divide the {name} interval of "

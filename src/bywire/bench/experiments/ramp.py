@@ -35,9 +35,9 @@ class Options(ParameterSet):
     drive: str
     """input or recorded signal that drives the loop, such as a current (default: the input)"""
     start: InputLevel
-    """input at the beginning and at the end"""
+    """input value at the beginning and at the end of the run"""
     end: InputLevel
-    """input at the turning point"""
+    """input value at the turning point"""
     slope: InputRate
     """magnitude of the slope, in both directions"""
     t_hold: TimeConstant

@@ -60,7 +60,7 @@ def admissible_frequencies(par: Par, low: float, high: float, count: int) -> lis
     if not inside:
         raise ParameterError(
             f"no dither frequency from {low:g} to {high:g} Hz has a period of an even number of "
-            f"sample times of {T * 1e3:g} ms. Widen the range (f_min, f_max), or sample faster "
+            f"sample times, {T * 1e3:g} ms. Widen the range (f_min, f_max), or sample faster "
             "(ecu.T_s)",
             name="f_min",
             value=f"{low:g}",
