@@ -152,12 +152,12 @@ def missed_ticks(task: str, assembly: str, period: float) -> Residual:
 
 
 def threshold(largest: Array, share: float) -> float:
-    """Return the threshold that at most a given fraction of healthy runs exceeds.
+    """Return the threshold that at most a given fraction of fault-free runs exceeds.
 
     Parameters
     ----------
     largest
-        Maximum of each healthy run, shape (cases,).
+        Maximum of each fault-free run, shape (cases,).
     share
         Allowed fraction of false alarms; if it is less than one run, no run exceeds the threshold.
     """
@@ -169,7 +169,7 @@ def threshold(largest: Array, share: float) -> float:
 def detected(lasted: Array, limit: float, time: Array, since: Array) -> Array:
     """Return the time at which a residual first exceeds its threshold [s]; NaN if never.
 
-    A residual that was always inactive in healthy runs has no threshold and detects nothing.
+    A residual that was always inactive in fault-free runs has no threshold and detects nothing.
     """
     if limit <= NEVER:
         return np.full(len(lasted), np.nan)
