@@ -1,4 +1,4 @@
-"""Page of each physical element and control law: equations, parameters, signals, faults."""
+"""Page of each physical element and control law: figure, equations, parameters, signals, faults."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet, field_notes, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.report.wording import range_text, unit_text
+from site_pages import element_figures
 
 _ROOMS = {"elements": "Elements", "laws": "Laws"}
 
@@ -40,9 +41,16 @@ def index() -> str:
     """Return the page that lists all elements and laws."""
     lines = ["Elements and control laws", "=" * 25, ""]
     for title, inside in modules().items():
-        lines += [title, "-" * len(title), "", ".. toctree::", "   :maxdepth: 1", ""]
+        lines += [title, "-" * len(title), ""]
+        rows = ([f":doc:`{name} <{m.__name__}>`", _summary(m)] for name, m in inside.items())
+        lines += _list_table(["name", "meaning"], rows)
+        lines += [".. toctree::", "   :hidden:", ""]
         lines += [f"   {module.__name__}" for module in inside.values()] + [""]
     return "\n".join(lines)
+
+
+def _summary(module: ModuleType) -> str:
+    return " ".join((inspect.getdoc(module) or "").partition("\n\n")[0].split())
 
 
 def page(module: ModuleType) -> str:
@@ -50,18 +58,18 @@ def page(module: ModuleType) -> str:
     name = module.__name__
     title = name.rpartition(".")[2].replace("_", " ").capitalize()
     lines = [title, "=" * len(title), "", f".. py:module:: {name}", ""]
-    lines += [inspect.getdoc(module) or "", ""]
+    lines += [inspect.getdoc(module) or "", "", *element_figures.lines(module)]
+    functions = [f for f in _declared_here(module) if inspect.isfunction(f)]
+    if functions:
+        lines += ["Equations", "-" * 9, ""]
+    for function in functions:
+        lines += [f".. autofunction:: {name}.{function.__name__}", ""]
     for each in _declared_here(module):
         if isinstance(each, type) and issubclass(each, ParameterSet):
             lines += _heading(each) + _parameters(each)
         elif isinstance(each, type) and issubclass(each, tuple):
             lines += _heading(each) + _signals(each)
     lines += _faults(getattr(module, "FAULTS", ()))
-    functions = [f for f in _declared_here(module) if inspect.isfunction(f)]
-    if functions:
-        lines += ["Equations", "-" * 9, ""]
-    for function in functions:
-        lines += [f".. autofunction:: {name}.{function.__name__}", ""]
     return "\n".join(lines)
 
 

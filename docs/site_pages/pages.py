@@ -10,6 +10,7 @@ from pathlib import Path
 from site_pages import (
     catalog,
     commands,
+    element_figures,
     elements,
     live_pages,
     papers,
@@ -59,6 +60,7 @@ def write(folder: Path, said: Callable[[str], None]) -> None:
     said("pages of elements, commands and names")
     for name, text in texts():
         _write(folder / name, text)
+    element_figures.write(folder / "elements" / element_figures.PLACE)
     for source in papers.sources():
         said(f"reproducing {source}")
         _write(folder / "papers" / f"{source}.md", papers.page(source, folder / "papers"))

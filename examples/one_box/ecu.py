@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 from bywire.authoring import Limited, Signal
 from bywire.control import current_pi, pedal_map, position_pd
 from bywire.core import ops
-from bywire.plant import h_bridge, solenoid_valve
+from bywire.plant import h_bridge
 from one_box.laws import plunger_pressure
 
 
@@ -31,16 +31,9 @@ class Memory(NamedTuple):
     omega_meas: Annotated[float, Signal("rad/s", "measured motor speed", 50.0)]
     i_ref: Annotated[float, Signal("A", "current set point", 20.0, set_point_of="i")]
     duty: Annotated[float, Signal("1", "duty cycle", 0.3), Limited("ecu.current.D_max")]
-    pi_integral: Annotated[float, Signal("1", "integral part of the current PI", 0.3)]
+    pi_integral: Annotated[float, Signal("1", "integral term of the current PI", 0.3)]
     sat_current: Annotated[float, Signal("1", "current demand saturated")]
     sat_duty: Annotated[float, Signal("1", "duty cycle saturated")]
-    close: Annotated[float, Signal("1", "inlet valve command")]
-    release: Annotated[float, Signal("1", "outlet valve command")]
-    pump: Annotated[float, Signal("1", "return pump command")]
-    close_on: Annotated[float, Signal("1", "inlet valve energized")]
-    close_waiting: Annotated[float, Signal("s", "time since the inlet command changed", 1e-3)]
-    release_on: Annotated[float, Signal("1", "outlet valve energized")]
-    release_waiting: Annotated[float, Signal("s", "time since the outlet command changed", 1e-3)]
 
 
 class Readings(NamedTuple):
@@ -53,7 +46,7 @@ class Readings(NamedTuple):
 
 
 def demand_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
-    """Sample the driver's foot, and convert the pedal travel to a pressure demand."""
+    """Sample the foot force, and convert the pedal travel to a pressure demand."""
     m = m._replace(foot=u.F_foot)
     if par.drive == "pedal":
         V = par.ecu.V_ref * ops.clip(r.x_rod / par.ecu.x_span, 0.0, 1.0)
@@ -103,18 +96,3 @@ def current_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
     )
     saturated = ops.where(ops.fabs(out.duty) >= limit, 1.0, 0.0)
     return m._replace(duty=out.duty, sat_duty=saturated, pi_integral=state.integral)
-
-
-def coil_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
-    """Pass the valve commands on to the armatures after their delays."""
-    T = par.ecu.T_coil
-    inlet = solenoid_valve.Coil(m.close_on, m.close_waiting)
-    inlet = solenoid_valve.delayed(inlet, m.close, T, par.inlet)
-    outlet = solenoid_valve.Coil(m.release_on, m.release_waiting)
-    outlet = solenoid_valve.delayed(outlet, m.release, T, par.outlet)
-    return m._replace(
-        close_on=inlet.on,
-        close_waiting=inlet.waiting,
-        release_on=outlet.on,
-        release_waiting=outlet.waiting,
-    )

@@ -7,7 +7,6 @@ from typing import Literal
 from bywire.authoring import Duration, Length, ParameterSet, Voltage
 from bywire.control import current_pi, pedal_map, position_pd
 from bywire.plant import (
-    accumulator,
     ball_screw_gear,
     battery_supply,
     brake_fluid,
@@ -19,9 +18,7 @@ from bywire.plant import (
     orifice,
     pedal_simulator,
     reservoir_port,
-    return_pump,
     seal_friction,
-    shaft,
     solenoid_valve,
     stiffening_caliper,
 )
@@ -40,8 +37,6 @@ class EcuParameters(ParameterSet):
     """sample time of position control"""
     T_current: Duration
     """sample time of current control"""
-    T_coil: Duration
-    """sample time of the valve delays"""
     V_ref: Voltage
     """supply voltage of the travel sensor at the pedal rod"""
     x_span: Length
@@ -70,15 +65,11 @@ class OneBoxParameters(ParameterSet):
     seal: seal_friction.Parameters
     plunger: master_cylinder.Parameters
     port: reservoir_port.Parameters
+    makeup: check_valve.Parameters
     stop: end_stop.Parameters
     line: orifice.Parameters
     others: stiffening_caliper.Parameters
     inlet: solenoid_valve.Parameters
     check: check_valve.Parameters
-    outlet: solenoid_valve.Parameters
     caliper: stiffening_caliper.Parameters
-    pump: return_pump.Parameters
-    pump_motor: dc_motor.Parameters
-    pump_shaft: shaft.Parameters
-    accumulator: accumulator.Parameters
     ecu: EcuParameters

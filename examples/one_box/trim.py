@@ -13,13 +13,14 @@ from one_box.model import OneBox
 from one_box.parameters import OneBoxParameters
 
 
-def travel_at(p: float, par: OneBoxParameters) -> float:
+def travel_at(p: float, par: OneBoxParameters, wheel: float | None = None) -> float:
     """Return the plunger travel [m] at a pressure [Pa], after slow filling.
 
-    The fluid in the chamber is compressed as much as its volume at this travel.
+    ``wheel``: pressure at the wheel [Pa]; default: that of the plunger.
     """
-    held = stiffening_caliper.State(p)
-    taken = sum(float(stiffening_caliper.volume(held, b)) for b in (par.caliper, par.others))
+    others = stiffening_caliper.volume(stiffening_caliper.State(p), par.others)
+    held = stiffening_caliper.State(p if wheel is None else wheel)
+    taken = float(others + stiffening_caliper.volume(held, par.caliper))
     cylinder = par.plunger
     start = cylinder.x_rest + par.port.x_port  # the plunger covers the port here
     shrink = math.exp(-p / par.fluid.beta)
@@ -32,22 +33,21 @@ def holding_current(p: float, par: OneBoxParameters) -> float:
     return par.gear.k_g * p * par.plunger.A_mc / par.motor.K_e
 
 
-def state_at(p: float, par: OneBoxParameters) -> Any:
-    """Return the state at rest at a pressure [Pa] in all brakes."""
-    held = stiffening_caliper.State(p)
+def state_at(p: float, par: OneBoxParameters, wheel: float | None = None) -> Any:
+    """Return the state at rest at a pressure [Pa]. ``wheel``: as in `travel_at`."""
     parts = released_parts(par) | {
         "motor": dc_motor.State(holding_current(p, par)),
-        "gear": ball_screw_gear.State(travel_at(p, par) / par.gear.k_g, 0.0),
+        "gear": ball_screw_gear.State(travel_at(p, par, wheel) / par.gear.k_g, 0.0),
         "chamber": master_cylinder.State(p),
-        "others": held,
-        "caliper": held,
+        "others": stiffening_caliper.State(p),
+        "caliper": stiffening_caliper.State(p if wheel is None else wheel),
     }
     return OneBox.state(**parts)
 
 
-def memory_at(p: float, par: OneBoxParameters) -> ecu.Memory:
+def memory_at(p: float, par: OneBoxParameters, wheel: float | None = None) -> ecu.Memory:
     """Return the memory with which each controller holds this state."""
-    i, theta = holding_current(p, par), travel_at(p, par) / par.gear.k_g
+    i, theta = holding_current(p, par), travel_at(p, par, wheel) / par.gear.k_g
     law = par.ecu.position
     stiffness = law.J_hat / law.K_hat * (2.0 * math.pi * law.f_n) ** 2
     duty = _duty(i, par)

@@ -216,7 +216,7 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ('below_share = "80 %"', 'above = "1 bar"\nbelow = "2 bar"', "needs exactly one of"),
         ('name = "too much"', 'name = "loss"', "occurs twice"),
         ("battery = 1", "batery = 1", "unknown fault in .rates. 'batery'"),
-        ('delay = "5 ms"', 'delay = "-5 ms"', "must be >= 0 s"),
+        ('delay = "5 ms"', 'delay = "-5 ms"', "must be >= 0 ms"),
         ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers can vary"),
         (
             'bench = "hard-braking"',

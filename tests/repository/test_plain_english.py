@@ -71,6 +71,16 @@ BANNED = (
     Banned(r"\bagree[sd]? within\b", "they agree within 1 %", "agree to within"),
     Banned(r"\bType for example\b", "Type for example --at 2", "For example, type"),
     Banned(r"\bsooner or later\b", "one tick sooner or later", "earlier or later"),
+    Banned(
+        r"\b(?:integral|derivative|proportional) parts?\b",
+        "integral part of the current PI",
+        "integral term",
+    ),
+    Banned(r"\bcounts? as\b", "a slow shaft counts as locked", "is considered, is treated as"),
+    Banned(r"\bof the order of \d", "of the order of 65 %", "on the order of"),
+    Banned(r"\bturnover of\b", "2 J of a turnover of 9 J", "of 9 J transferred"),
+    Banned(r"\bcounts? fully\b", "dither counts fully", "is fully included"),
+    Banned(r"\bjudged statements?\b", "3 of 9 judged statements", "judged values"),
     Banned(r"\bfused? products?\b", "without fused products", "fused multiply-add"),
     Banned(
         r"\b(?:agree[sd]?|match(?:es|ed)?) [^.;:|]{1,60}(?<!\bto )\bwithin \d",
@@ -93,6 +103,12 @@ IN_GUIDES = (
     Banned(r"\b(?:finished|large|small|larger) share\b", "a finished share of 5 %", "fraction"),
     Banned(r"\b(?:all|two|the stated) figures (?:agree|differ)", "all figures agree", "values"),
     Banned(r"\bthe (?:outer|inner|left|slipping) one\b", "follows the left one", "the noun"),
+    Banned(r"\bwith file and line\b", "an error with file and line", "with the file and line"),
+    Banned(
+        r"\bcloser to (?:its|the) (?:limit|tolerance) than\b",
+        "it is closer to its limit than its error",
+        "the difference from the limit is smaller than",
+    ),
 )
 """phrases of hand-written pages, which strings of the package may still contain"""
 _GENERATED = {"_build", "_generated"}

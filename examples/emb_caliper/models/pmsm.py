@@ -126,7 +126,6 @@ class EmbCaliperPmsm(CaliperBrake[Par, Any]):
         """
         i = w.motor.x
         theta_e = w.motor.par.p * w.rotor.xe.theta
-        duty_d, duty_q = inverter.rotated(w.m.duty_alpha, w.m.duty_beta, theta_e)
         if w.par.drive == "voltage":
             w.i_dc = 0.0 * i.i_q
             w.v_d, w.v_q = 0.0 * i.i_d, w.m.v_source
@@ -134,7 +133,9 @@ class EmbCaliperPmsm(CaliperBrake[Par, Any]):
                 0.0 * w.v_d, 0.0 * w.v_q, 0.0 * i.i_d, 0.0 * i.i_q, theta_e, w.par.supply.V_bat
             )
         else:
-            w.i_dc = 1.5 * (duty_d * i.i_d + duty_q * i.i_q)
+            w.i_dc = inverter.bus_current(
+                w.m.duty_alpha, w.m.duty_beta, i.i_d, i.i_q, theta_e, w.inverter.par
+            )
             bus = battery_supply.output(battery_supply.Input(w.i_dc), w.supply.par).v_bus
             w.inverter.u = inverter.Input(
                 bus * w.m.duty_alpha, bus * w.m.duty_beta, i.i_d, i.i_q, theta_e, bus
@@ -178,8 +179,9 @@ def _reading(law: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
     """Return a controller's tick with the sensor readings."""
 
     def tick(x: Any, m: Any, u: ecu.Stimulus, par: Par) -> Any:
-        i_alpha, i_beta = inverter.rotated(x.i_d, x.i_q, -par.motor.p * x.theta)
-        i_dc = 1.5 * (m.duty_alpha * i_alpha + m.duty_beta * i_beta)
+        theta_e = par.motor.p * x.theta
+        i_alpha, i_beta = inverter.rotated(x.i_d, x.i_q, -theta_e)
+        i_dc = inverter.bus_current(m.duty_alpha, m.duty_beta, x.i_d, x.i_q, theta_e, par.inverter)
         readings = ecu_pmsm.Readings(
             x.F_cell,
             angle_sensor.reading(x.theta, par.encoder),

@@ -26,7 +26,7 @@ from one_box.rigs.corner import OneBoxCorner, OneBoxCornerParameters, rolling
 
 RidingSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
 Demand = Annotated[float, Unit("Pa", 1e7), Field(gt=0, allow_inf_nan=False)]
-SLOW = 2.5
+SLOW = 4.0
 """speed [m/s] below which the wheel may lock"""
 _SETTLED = 0.5  # s until the first cycle is over
 _NO_CYCLE = "anti-lock control does not release the wheel twice"
@@ -86,7 +86,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     run = recordings["run"]
     t, v = run["time"].values, run["v_x"].values
     still = np.flatnonzero((v <= 1e-3) & (t > 0.0))
-    if not still.size:
+    if not still.size or not float(run["s"][still[0]]) > 0.0:
         return FIGURES(**dict.fromkeys(FIGURES.units, math.nan))
     until = int(still[0])
     stop = run.isel(time=slice(0, until + 1))
@@ -159,5 +159,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     kpis=FIGURES.units,
-    figures=("time-traces", "energy-balance"),
+    figures=("time-traces", "slip-cycle", "energy-balance"),
 )

@@ -8,15 +8,15 @@ from bywire.authoring import Bounds, Integral, Part, Role, Shown, Task, zeros
 from bywire.plant import brake_disc, road, road_wheel, wheel_encoder
 from bywire.vehicle import Corner, CornerParameters, WheelSpeed, rolling_states, slip_control
 from one_box import antilock
-from one_box.hydraulics import Hydraulics, released_memory, released_parts
-from one_box.parameters import OneBoxParameters
+from one_box.hydraulics import released_memory
+from one_box.modulator import Modulator, ModulatorParameters, modulator_parts
 
 
 def _vehicle(label: str, returns: Any = "") -> Role:
     return Role("sink", label, returns=returns, book="vehicle")
 
 
-class OneBoxCornerParameters(OneBoxParameters):
+class OneBoxCornerParameters(ModulatorParameters):
     """The brake, its wheel, and a quarter of the car."""
 
     disc: brake_disc.Parameters
@@ -25,11 +25,12 @@ class OneBoxCornerParameters(OneBoxParameters):
     antilock: antilock.Parameters
 
 
-class OneBoxCorner(Corner[OneBoxCornerParameters, Any], Hydraulics[OneBoxCornerParameters, Any]):
+class OneBoxCorner(Corner[OneBoxCornerParameters, Any], Modulator[OneBoxCornerParameters, Any]):
     """The brake at a wheel. A second dry friction acts on the disc."""
 
     name: ClassVar[str] = "one-box-corner"
     Memory: ClassVar = antilock.Memory
+    Stimulus: ClassVar = antilock.Stimulus
     frictions: ClassVar[tuple[str, ...]] = ("omega", "omega_w")
 
     disc = Part(brake_disc)
@@ -80,15 +81,17 @@ class OneBoxCorner(Corner[OneBoxCornerParameters, Any], Hydraulics[OneBoxCornerP
         }
 
     def antilock(self, par: Any) -> tuple[Task, ...]:
-        """Return the task of anti-lock control, if it is on."""
-        return () if par.antilock.abs == "off" else (Task("antilock", par.antilock.T_s, _tick),)
+        """Return the tasks of anti-lock control or of commanded valves, and the valves' delays."""
+        T = par.antilock.T_s
+        law = _sampled if par.antilock.abs == "off" else _controlled
+        return (Task("antilock", T, law), Task("coils", T, _coils))
 
     def rest(self, par: Any) -> tuple[Any, Any]:
         """Return the vehicle at rest with released brakes."""
         return rolling(par, 0.0)
 
 
-def _tick(x: Any, m: Any, u: Any, par: OneBoxCornerParameters) -> Any:
+def _controlled(x: Any, m: Any, u: Any, par: OneBoxCornerParameters) -> Any:
     """Read the wheel, and run anti-lock control once."""
     edge = wheel_encoder.reading(
         wheel_encoder.State(x.phi_w), wheel_encoder.Input(x.omega_w), par.antilock.encoder
@@ -99,10 +102,18 @@ def _tick(x: Any, m: Any, u: Any, par: OneBoxCornerParameters) -> Any:
     return antilock.tick(seen, x.p_mc, m, par)
 
 
+def _sampled(x: Any, m: Any, u: Any, par: OneBoxCornerParameters) -> Any:
+    return antilock.sample(m, u)
+
+
+def _coils(x: Any, m: Any, u: Any, par: OneBoxCornerParameters) -> Any:
+    return antilock.coils(m, par)
+
+
 def rolling(par: OneBoxCornerParameters, v: float) -> tuple[Any, Any]:
     """Return state and memory of a car that rolls at a speed [m/s] with released brakes."""
     state = OneBoxCorner.state(
-        **released_parts(par), **rolling_states(v), turning=road_wheel.State(v / par.wheel.r)
+        **modulator_parts(par), **rolling_states(v), turning=road_wheel.State(v / par.wheel.r)
     )
     awake = slip_control.awake(v, par.antilock)
     held = released_memory(par) | awake | {"building": 1.0}

@@ -34,7 +34,7 @@ _REST = 1e-6  # Hz: frequency that represents rest
 _BAND = 0.02  # of the step: half the settling band
 _MOST = 2**15  # samples of a step response: 33 s for a loop of 1 kHz
 _NOISE_POINTS = 1000  # frequencies, evenly spaced
-_LEFT_AFTER = 10.0  # periods of the bandwidth after which an error counts as steady
+_LEFT_AFTER = 10.0  # periods of the bandwidth after which an error is treated as steady
 _SETTLED = 1e-4  # maximum remaining fraction of the slowest mode at the end of a step response
 
 

@@ -155,7 +155,7 @@ class Probability:
         if self.judged.unstable:
             lines.append(
                 f"{self.judged.unstable} of these other models are unstable or do not exist. They "
-                "count as failing every requirement"
+                "are treated as failing every requirement"
             )
         if self.drawn.lacking:
             lines.append(f"for {self.drawn.lacking} more draws, no model exists")

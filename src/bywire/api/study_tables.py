@@ -374,8 +374,8 @@ def rare_notes(findings: Findings) -> list[str]:
         )
     if unjudged := [str(each) for each in plan.demands if each not in plan.judged_demands]:
         notes.append(
-            f"no verdict without a required probability: {'; '.join(unjudged)}. Cases that search "
-            "for failures do not represent all cases"
+            f"no verdict without a required probability: {'; '.join(unjudged)}. Cases from a "
+            "failure search are not a random sample"
         )
     notes += [
         f"{each.demand.figure}: the probability of failure is below a thousandth of the limit, so "

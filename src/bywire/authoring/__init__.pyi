@@ -5,6 +5,7 @@ from bywire.analysis.linear.linearize import linearize as linearize
 from bywire.analysis.linear.sampled_loops import closed_loop as closed_loop
 from bywire.analysis.loop import LOOPS as LOOPS
 from bywire.analysis.loop import Loop as Loop
+from bywire.analysis.loop import LoopSchedule as LoopSchedule
 from bywire.analysis.loop import Plant as Plant
 from bywire.analysis.loop import PlantPoint as PlantPoint
 from bywire.analysis.loop import Point as Point
@@ -35,6 +36,8 @@ from bywire.bench.stimulus import Stimulus as Stimulus
 from bywire.campaigns.residual import NEVER as NEVER
 from bywire.campaigns.residual import DeclaredCampaign as DeclaredCampaign
 from bywire.campaigns.residual import Residual as Residual
+from bywire.campaigns.residual import largest_of_the_last as largest_of_the_last
+from bywire.campaigns.residual import least_of_the_last as least_of_the_last
 from bywire.campaigns.residual import mean_of_the_last as mean_of_the_last
 from bywire.core import quantities as quantities
 from bywire.core import signals as signals

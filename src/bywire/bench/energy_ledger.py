@@ -7,8 +7,9 @@ and ``E_stored`` and every other ``E_...`` are sinks.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any
 
@@ -218,7 +219,16 @@ def _ledger(recording: xr.Dataset, book: str, is_split: bool = True) -> Ledger:
                 Posting(f"{name}_{kind}", f"{role.label}, {kind}", split[f"{name}_{kind}"])
                 for kind in kinds
             ] or [Posting(name, role.label, changes[name])]
-    return Ledger(tuple(given), tuple(taken))
+    return Ledger(_told_apart(given), _told_apart(taken))
+
+
+def _told_apart(postings: Sequence[Posting]) -> tuple[Posting, ...]:
+    """Return postings whose labels differ; equal labels are followed by the variable's name."""
+    count = Counter(each.label for each in postings)
+    return tuple(
+        replace(each, label=f"{each.label} ({each.name})") if count[each.label] > 1 else each
+        for each in postings
+    )
 
 
 def _roles(recording: xr.Dataset, names: Collection[str]) -> dict[str, Role]:

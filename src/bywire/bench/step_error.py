@@ -82,8 +82,8 @@ def _share(factor: float) -> str:
 def are_distinct(values: Sequence[float], errors: Sequence[float]) -> bool:
     """Return whether any two values differ by more than their errors.
 
-    Errors that were not estimated (NaN) count as zero. An undefined value (NaN) differs from a
-    defined one, unless an error is infinite.
+    Errors that were not estimated (NaN) are treated as zero. An undefined value (NaN) differs from
+    a defined one, unless an error is infinite.
 
     Examples
     --------

@@ -40,7 +40,7 @@ class FaultFinding:
     detected
         Time from onset until each residual detects it [s], by name; shape (factors, cases).
     extremes
-        By signal: minimum, maximum and final deviation from the healthy run.
+        By signal: minimum, maximum and final deviation from the fault-free run.
     reacted
         Times of violation with the reaction, by criterion, for runs in which it was possible.
     answered
@@ -197,7 +197,7 @@ class CampaignFindings:
 
     @property
     def false_alarms(self) -> Share:
-        """Fraction of healthy runs, not used for tuning, in which a residual raises an alarm."""
+        """Fraction of fault-free runs, not used for tuning, in which a residual raises an alarm."""
         plan = self.plan
         return share(self.healthy.any_alarm, plan.healthy - plan.tuning, CONFIDENCE)
 

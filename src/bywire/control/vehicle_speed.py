@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     law: Literal["wheels", "accelerometer"]
     """source of the speed while the wheels slip"""
     a_max: Annotated[float, Unit("m/s**2", 12.0), Field(gt=0, allow_inf_nan=False)]
-    """maximum deceleration of any braking (law "wheels")"""
+    """maximum deceleration in any stop (law "wheels")"""
     slip_small: Weight
     """slip up to which a wheel is considered reliable (law "accelerometer")"""
     tau: Duration

@@ -90,8 +90,8 @@ def estimate_lag(
 
     Notes
     -----
-    A difference between the sensors' time constants also counts as lag. To remove a lag, specify
-    it as ``delay`` in the mapping of the second signal.
+    A difference between the sensors' time constants is also treated as lag. To remove a lag,
+    specify it as ``delay`` in the mapping of the second signal.
     """
     reach = units.parse(largest, "s", "largest")
     if interval is None:

@@ -247,7 +247,7 @@ def _require_alive(plan: LifePlan, z: Values) -> None:
                 f"{shown(value, limit.unit)} at the start. It must be > 0",
                 name=limit.label,
                 value=shown(value, limit.unit),
-                valid="above zero",
+                valid="> 0",
             )
 
 

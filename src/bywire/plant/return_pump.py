@@ -24,7 +24,7 @@ from bywire.core.quantities import Conductance, Length, Unit, Volume
 from bywire.core.signals import Energy, Power, Pressure, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.core.validity import highest, row_by_row
+from bywire.core.validity import first, highest, row_by_row
 from bywire.plant import brake_fluid, check_valve
 
 Phase = Annotated[float, Unit("rad", 1.0), Field(allow_inf_nan=False)]
@@ -32,8 +32,12 @@ ClosingTime = Annotated[float, Unit("s", 5e-5), Field(gt=0, allow_inf_nan=False)
 PumpPressure = Annotated[float, Unit("Pa", 2.5e7), Field(gt=0, allow_inf_nan=False)]
 Flow = Annotated[float, Signal("m**3/s", "flow", 1e-5)]
 Loss = Annotated[float, Signal("W", "loss in the return pump", role=Role("sink", "return pump"))]
-SMALLEST = 1e-12
-"""share of the displacement below which a void does not count"""
+DEAD_BAND = 1e-4
+"""share of the displacement below which a void does not count, larger than the step's errors"""
+
+
+NOTHING = 1e-12
+"""share of the displacement that avoids a division of 0 by 0 at the dead centers"""
 
 
 class Parameters(ParameterSet):
@@ -116,8 +120,12 @@ def displacement(par: Parameters) -> Annotated[float, Signal("m**3", "volume", 7
 def void(
     x: State, u: Input, par: Parameters
 ) -> Annotated[float, Signal("m**3", "void in the pump", 3e-8)]:
-    r"""Return the volume without fluid, :math:`V_{void} = \max(A_p e \cos\varphi - V, 0)`."""
-    return ops.fmax(area(par) * par.e * ops.cos(u.theta + par.phase) - x.V, 0.0)
+    r"""Return the volume without fluid, :math:`V_{void} = \max(A_p e \cos\varphi - V, 0)`.
+
+    A void below 1e-4 of the displacement does not count.
+    """
+    empty = area(par) * par.e * ops.cos(u.theta + par.phase) - x.V
+    return ops.fmax(empty - DEAD_BAND * displacement(par), 0.0)
 
 
 def growth(u: Input, par: Parameters) -> Flow:
@@ -185,7 +193,7 @@ def output(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -
     before = h(u.p_s, fluid) - check_valve.pressure_drop(flows.suction, par.suction, fluid)
     behind = h(u.p_d, fluid) + check_valve.pressure_drop(flows.delivery, par.delivery, fluid)
     swept = par.tau * ops.fabs(s)
-    solid = swept / ops.fmax(swept + empty, SMALLEST * displacement(par))
+    solid = swept / ops.fmax(swept + empty, NOTHING * displacement(par))
     above = ops.where(s > 0.0, ops.fmax(before - vacuum, 0.0), behind - vacuum)
     arm = area(par) * par.e * ops.sin(u.theta + par.phase)
     back = returned(u, par, fluid)
@@ -232,11 +240,12 @@ def power_loss(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameter
 
 
 @row_by_row
-def watch(t: Array, u: Input, par: Parameters) -> list[str]:
-    """Warn if the delivery pressure exceeds the permitted one."""
+def watch(t: Array, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> list[str]:
+    """Warn if the delivery pressure exceeds the permitted one, or suction is below vacuum."""
+    below = "the absolute pressure at the pump's suction is below zero"
+    texts = first(t, u.p_s < -fluid.p_atm, below)
     p = highest(u.p_d)
-    if not p > par.p_max:
-        return []
-    return [
-        f"the return pump works against {shown(p, 'Pa')}, above p_max = {shown(par.p_max, 'Pa')}"
-    ]
+    if p > par.p_max:
+        limit = shown(par.p_max, "Pa")
+        texts.append(f"the return pump works against {shown(p, 'Pa')}, above p_max = {limit}")
+    return texts

@@ -123,16 +123,8 @@ def balance(
 
 
 def opening(x: State, par: Parameters) -> orifice.Opening:
-    r"""Return the opened fraction of the orifice.
-
-    .. math:: \frac{A(x)}{A} = \min\left(\frac{\pi d x \sin\alpha}{\pi d^2 / 4}, 1\right)
-
-    Notes
-    -----
-    It has a kink at the lift :math:`d / (4 \sin\alpha)`, where the conical gap becomes as large as
-    the orifice. Linear models of the fully open valve have no kink if the full lift is larger.
-    """
-    return ops.fmin(4.0 * x.x * ops.sin(par.alpha) / par.seat.d, 1.0)
+    """Return the opened fraction of the orifice (`orifice.conical_opening`)."""
+    return orifice.conical_opening(x.x, par.alpha, par.seat)
 
 
 def flow(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> orifice.Flow:

@@ -12,6 +12,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Length, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
+from bywire.core.units import shown
 from bywire.core.validity import first, highest, row_by_row
 
 BodyMass = Annotated[float, Unit("kg", 250.0), Field(gt=0, allow_inf_nan=False)]
@@ -57,7 +58,9 @@ class Parameters(ParameterSet):
     def _stands(self) -> Parameters:
         if not self.l_f < self.L:
             reason = "the center of gravity is between the wheels"
-            raise RuleError("l_f", f"{self.l_f:g} m", f"< the wheelbase L = {self.L:g} m", reason)
+            raise RuleError(
+                "l_f", shown(self.l_f, "m"), f"< the wheelbase L = {shown(self.L, 'm')}", reason
+            )
         return self
 
 

@@ -71,14 +71,14 @@ Curve = Sequence[tuple[float, int, float, int]]
 
 
 def alarm_curves(curves: Mapping[str, Curve], healthy: int) -> Figure:
-    """Draw each residual's detection delay of dangerous faults versus alarms in healthy runs.
+    """Draw each residual's detection delay of dangerous faults versus alarms in fault-free runs.
 
     Parameters
     ----------
     curves
         Residual -> factor of the threshold, alarms, median delay [s], number of detected runs.
     healthy
-        Number of judged healthy runs.
+        Number of judged fault-free runs.
     """
     figure, (axes,) = style.new_figure(3.2)
     markers = "osD^vPX*<>"

@@ -40,7 +40,7 @@ _ESTIMATE = "estimate.json"
 """file with the estimates in an identification's folder"""
 _LARGEST = 20_000_000  # maximum size of the file in bytes
 _TRUNCATE = "Truncate the distribution with truncate = true"
-_WEAK = 1e-9  # correlation that counts as zero
+_WEAK = 1e-9  # correlation that is treated as zero
 
 
 class MeasuredSection(Section):

@@ -315,4 +315,5 @@ def test_a_campaign_injects_the_faults_of_the_new_elements(command: Any, tmp_pat
         "motor.demagnetized",
         "encoder.turned",
         "inverter.slow-driver",
+        "inverter.gates-off",
     }

@@ -28,7 +28,7 @@ from bywire.core.signals import signals_of, zeros
 from bywire.core.typing import Array
 
 Friction = Literal["removed", "sliding", "stuck"]
-_TOUCH = 1e-12  # overlap or gap [m] below which a contact counts as neither closed nor open
+_TOUCH = 1e-12  # overlap or gap [m] below which a contact is treated as neither closed nor open
 
 
 @checked

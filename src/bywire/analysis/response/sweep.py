@@ -436,7 +436,7 @@ def spread_of(figures: Complex, settled: NDArray[np.bool_]) -> tuple[Complex, Ar
     tuple
         Amplitudes, shape (cases, lines): those of the last window if they repeat, otherwise the
         mean of the windows that count. Their scatter, relative to the amplitude: root mean square
-        of the windows' distances from their mean. A drift counts as scatter.
+        of the windows' distances from their mean. A drift is treated as scatter.
     """
     seen = kept(figures, settled)
     mean = seen.mean(axis=1)

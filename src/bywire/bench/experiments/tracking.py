@@ -1,4 +1,4 @@
-"""Tracking: an output follows a moving input, for example from a measured pedal."""
+"""Tracking: an output follows a moving input, for example from a recorded pedal signal."""
 
 from __future__ import annotations
 

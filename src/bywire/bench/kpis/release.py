@@ -21,7 +21,7 @@ class Setting:
     signal
         Name of the signal in the recording; the release begins at time zero.
     empty
-        Level below which the signal counts as released, in its SI unit.
+        Level below which the signal is treated as released, in its SI unit.
     """
 
     signal: str

@@ -24,7 +24,7 @@ from bywire.bench.kpis.samples import Samples, integral, moving_average, total, 
 _DEAD, _BAND = 0.05, 0.02  # of the step height: end of the dead time; half settling band
 _MOVING = 0.02  # of the step height, between both halves of the steady-state window
 _LAST = 0.2  # of the time after the step: default steady-state window
-_SETTLED = 0.1  # of the time after the step: minimum time in the band that counts as settled
+_SETTLED = 0.1  # of the time after the step: minimum time in the band that is treated as settled
 
 
 @dataclass(frozen=True)
@@ -300,7 +300,7 @@ def _why_still(response: Response) -> Undefined | None:
     if not response.most <= _DEAD * height:
         return None
     return Undefined(
-        f"the response does not move: it changes by at most {response.most:.3g} in a step of "
+        f"the response hardly changes: it varies by at most {response.most:.3g} in a step of "
         f"{height:.3g} {{level}}",
         is_open=True,
     )

@@ -104,7 +104,7 @@ def final_winding(data: Warming) -> float | Undefined:
 
 @measure("s", needs=("derated",))
 def time_derated(data: Warming) -> float | Undefined:
-    """Time during which the motor's current is limited because of high temperature.
+    """Time during which the motor's current is limited because the motor is too hot.
 
     Trapezoidal integral of the mode's samples: a change is assumed halfway between two samples.
     """

@@ -33,7 +33,7 @@ class Options(ParameterSet):
     """The ride."""
 
     trace: str
-    """measurement file with time and pedal, force or pressure; empty: built-in ride"""
+    """measurement file with time and pedal, force or pressure; leave empty for the built-in ride"""
     trace_map: str
     """mapping file for pedal, force or pressure; empty if the columns have these names"""
     max_gap: TimeConstant

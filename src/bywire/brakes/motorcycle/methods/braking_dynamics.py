@@ -303,11 +303,11 @@ class Options(ParameterSet):
     plant: Literal["brake", "eq-22"]
     """synthetic: the whole brake with friction, or a linear model exactly as in eq. (22)"""
     p_low: Pressure
-    """synthetic: mean pressure of the low region"""
+    """synthetic: mean pressure in the low-pressure region"""
     p_medium: Pressure
-    """synthetic: mean pressure of the medium region"""
+    """synthetic: mean pressure in the medium-pressure region"""
     p_high: Pressure
-    """synthetic: mean pressure of the high region"""
+    """synthetic: mean pressure in the high-pressure region"""
     i_step: Current
     """synthetic: step height"""
     amplitude: Current

@@ -32,7 +32,7 @@ from bywire.identification.unknown import parameters_of
 from bywire.simulation.run import simulate
 
 _NAMES = ("motor.R_m", "motor.L_m", "motor.K_e")
-_TURNS = 1.0  # rad/s: a slower shaft counts as locked
+_TURNS = 1.0  # rad/s: a slower shaft is treated as locked
 _STEP = 2e-6  # s, simulated experiment: a coarse step biases L_m if the shaft turns
 
 

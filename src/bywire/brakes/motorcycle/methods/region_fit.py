@@ -23,7 +23,7 @@ from bywire.identification.unknown import Unknown, moved
 
 Complex = NDArray[np.complex128]
 
-_LEAST = 0.1  # minimum height of a peak that counts as a line, relative to the strongest line
+_LEAST = 0.1  # minimum height of a peak that is treated as a line, relative to the strongest line
 _FINER = 4  # zero padding of the transform that detects the lines
 _ROUNDS = 5  # Newton iterations for their frequencies
 _STILL = 1e-9  # relative to a signal's magnitude: a smaller change is rounding

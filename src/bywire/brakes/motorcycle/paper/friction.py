@@ -170,7 +170,8 @@ def _identified_exhibit() -> Exhibit:
 
 _WITHOUT, _WITH = "without-dither", "with-dither"
 _REMOVED = 0.1
-"""width below which a loop counts as removed, relative to the undithered loop's at mid-height"""
+"""width below which a loop is treated as removed, relative to the undithered loop's at
+mid-height"""
 _SLOWER = 10.0
 """how many times slower than eq. (17) the slow ramp is"""
 _LEVELS = np.arange(ALLOWANCES["level"].size, 45.0, 0.1) * BAR
@@ -203,7 +204,7 @@ class _Loops:
 
     @property
     def removed_above(self) -> float:
-        """Pressure [bar] above which the dithered loop counts as removed."""
+        """Pressure [bar] above which the dithered loop is treated as removed."""
         setting = hysteresis.Setting("i_filtered", "p_mc", smoothing=0.02)
         loop = hysteresis.select(self.result.recordings[_WITH], setting)
         width = _REMOVED * self.values["loop_width_mid_undithered"]

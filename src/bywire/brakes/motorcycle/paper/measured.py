@@ -613,13 +613,13 @@ def _sized(values: Array) -> tuple[Unknown, ...]:
     )
 
 
-# --- Uncertainty of a brake that counts as the best
+# --- Uncertainty of a brake that is treated as the best
 
 
 def appraised(par: Par) -> Appraisal:
     """Return the uncertainty of a brake's free parameters, which must minimize the misfit.
 
-    Parameters that the statements do not determine count as fixed at their values.
+    Parameters that the statements do not determine are treated as fixed at their values.
 
     Raises
     ------

@@ -398,7 +398,7 @@ def _warnings(
 STUDY = Study(
     name="dither",
     assembly="motorcycle-brake",
-    summary="amplitude and frequency of the cheapest dither that overcomes friction",
+    summary="amplitude and frequency of the lowest-loss dither that overcomes friction",
     options=Options,
     defaults=DEFAULTS,
     compute=compute,

@@ -16,7 +16,7 @@ from bywire.core.typing import Array
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
 
-_LEFT = 0.1  # fraction of the torque below which the brake counts as released
+_LEFT = 0.1  # fraction of the torque below which the brake is treated as released
 _END = 0.1  # s: averaging window at the end
 
 FIGURES = Figures(

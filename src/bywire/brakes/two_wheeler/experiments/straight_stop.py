@@ -83,7 +83,8 @@ def straight_stop(
 STRAIGHT_STOP = Experiment(
     name="straight-stop",
     assembly="two-wheeler-by-wire",
-    summary="panic stop from {v_0:km/h} with {p_front} front and {p_rear} rear, on {surface}",
+    summary="panic stop from {v_0:km/h} with {p_front} at the front and {p_rear} at the rear, on "
+    "{surface}",
     options=StraightStopOptions,
     defaults=StraightStopOptions(
         v_0=100.0 / 3.6, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0
@@ -220,7 +221,7 @@ _BANDWIDTHS = BandwidthsOptions(
 BANDWIDTHS = Experiment(
     name="bandwidths",
     assembly="two-wheeler-by-wire",
-    summary="controlled stops from {v_0} on {surface} with pressure loops of {f_n}",
+    summary="controlled stops from {v_0} on {surface} with pressure-loop bandwidths of {f_n}",
     options=BandwidthsOptions,
     defaults=_BANDWIDTHS,
     cases=bandwidths,

@@ -464,7 +464,8 @@ def _pulse_power(runs: Runs, result: Result) -> list[Item]:
             "fig9.power",
             FACTS["power"],
             peak(run, "P_meas"),
-            note="maximum filtered power. Standby, filter and rate limit are tuned to it",
+            note="maximum filtered power. We tuned the standby power, the filter and the rate "
+            "limit to match this value",
             tuned="calibrated",
         ),
         compared(

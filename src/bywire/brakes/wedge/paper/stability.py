@@ -34,7 +34,7 @@ _TRIED = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
 _LOWEST, _HIGHEST = 0.32, 0.62
 """bounds of the search for the lowest coefficient at which the brake runs away"""
 _GROWN = 1.05
-"""ratio to the moment at power-off above which the brake counts as having run away"""
+"""ratio to the moment at power-off above which the brake is treated as having run away"""
 _VARIANTS = (
     ("", "fixed", "kept"),
     (".frictionless", "fixed", "none"),

@@ -428,7 +428,7 @@ DEFAULTS = Options(
 
 _NONE_FEASIBLE = "no design is feasible. Increase t_90 or t_hold, or compare other designs"
 _NEAR = 1.05
-"""designs within this factor of the minimum power count as equally good"""
+"""designs within this factor of the minimum power are treated as equally good"""
 _ROUNDS = 2  # rounds that refine the optimum; each halves the spacing
 _TINY = 1e-6  # fraction of the spacing
 _BORDER = 0.02  # contour between 0, feasible, and 1, close to the last feasible designs
@@ -654,15 +654,15 @@ def _edges(best: _Best, options: Options) -> tuple[str, ...]:
 # --- Many drive trains as a dataset
 
 _LATE = 1.02
-"""ratio to the demanded time up to which a design counts as equally fast"""
+"""ratio to the demanded time up to which a design is treated as equally fast"""
 
 
 _HELD = 0.95
-"""fraction of the demand above which the demand counts as held"""
+"""fraction of the demand above which the demand is treated as held"""
 
 
 _LEFT = 0.05
-"""fraction of the demand below which the brake counts as released"""
+"""fraction of the demand below which the brake is treated as released"""
 
 
 _NEVER = 10.0  # lateness if the moment is never reached
@@ -752,7 +752,7 @@ def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Label
 
 # --- Limits of a drive train: active constraints, and failures or power of its neighbors
 
-_AT = 0.99  # fraction of a limit above which the limit counts as reached
+_AT = 0.99  # fraction of a limit above which the limit is treated as reached
 
 
 def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
