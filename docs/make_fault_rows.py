@@ -1,4 +1,4 @@
-"""Write docs/fault-rows.md: stated figures of faults next to computed figures.
+"""Write docs/fault-rows.md: reference values of faults next to computed values.
 
 ``python docs/make_fault_rows.py``
 """
@@ -18,18 +18,18 @@ TABLES: dict[str, tuple[Any, ...]] = {
     "The motorcycle brake": motorcycle.ROWS,
     "The wedge brake": wedge.ROWS,
 }
-HEAD = """# Faults: stated and computed figures
+HEAD = """# Faults: reference values and computed values
 
-The tables compare stated figures for faults with figures that bywire computes. The stated figures
-come from prototypes with the same equations, and in some rows from earlier bywire results. The
-tolerance is 10 %, 0.2 bar or 10 ms, whichever is largest. If figures disagree, the reason is below
-the table. A dash means that there is no stated figure.
+The tables compare reference values for faults with values that bywire computes. The reference
+values come from prototypes that use the same equations, and in some rows from earlier bywire
+results. The tolerance is 10 %, 0.2 bar or 10 ms, whichever is largest. If the values disagree, the
+reason is below the table. A dash means that there is no reference value.
 
 [faults.md](faults.md) describes the faults and how to inject them. It also contains the results for
-a lost wheel encoder, for which there are no stated figures. `python docs/make_fault_rows.py`
+a lost wheel encoder, for which there are no reference values. `python docs/make_fault_rows.py`
 computes this page, and `tests/examples/test_fault_rows.py` checks it.
 """
-HEADING = ("fault", "figure", "stated", "computed", "unit", "agrees")
+HEADING = ("fault", "quantity", "reference", "computed", "unit", "agrees")
 
 
 def page() -> str:
@@ -47,7 +47,7 @@ def page() -> str:
         )
         lines += ["", "Reasons for disagreements:", "", *apart, ""] if apart else [""]
         notes = [f"- `{row.fault}`, {row.what}: {row.note}." for row in rows if row.note]
-        lines += ["Notes on other figures:", "", *notes, ""] if notes else []
+        lines += ["Notes on other values:", "", *notes, ""] if notes else []
     return "\n".join(lines)
 
 

@@ -86,7 +86,7 @@ class Memory(NamedTuple):
     """Memory of the controller between its ticks."""
 
     v: Annotated[float, Signal("V", "motor voltage", 5.0), Limited("control.v_max")]
-    v_i: Annotated[float, Signal("V", "integral part", 5.0)]
+    v_i: Annotated[float, Signal("V", "integral term", 5.0)]
     sat_voltage: Annotated[float, Signal("1", "voltage limited")]
 
 

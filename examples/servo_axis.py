@@ -4,9 +4,9 @@ A DC motor turns an inertia against viscous friction, and against dry friction t
 forward than backward. An encoder counts its angle. A position controller (P) and a speed controller
 (PI with anti-windup) run at 1 kHz.
 
-Without the integral part, the axis stops completely where friction balances the motor torque from
+Without the integral term, the axis stops completely where friction balances the motor torque from
 the position error. It stops short of the target by up to T R_m / (K_e k_p k_angle) plus half a
-count, with the friction T in the direction of arrival. With the integral part, the axis creeps
+count, with the friction T in the direction of arrival. With the integral term, the axis creeps
 until the encoder shows the target, and then also stops completely.
 """
 
@@ -55,11 +55,11 @@ class Parameters(ParameterSet):
 
 
 class Memory(NamedTuple):
-    """Memory of the controller between its ticks: measured angle, voltage, integral part."""
+    """Memory of the controller between its ticks: measured angle, voltage, integral term."""
 
     seen: Angle
     v: Annotated[float, Signal("V", "voltage"), Limited("v_max")]
-    v_i: Annotated[float, Signal("V", "integral part")]
+    v_i: Annotated[float, Signal("V", "integral term")]
 
 
 class Stimulus(NamedTuple):
@@ -69,7 +69,7 @@ class Stimulus(NamedTuple):
 
 
 def control(x, m, u, par):
-    """Run the cascade once. The integral part stops while the voltage is limited."""
+    """Run the cascade once. The integral term stops while the voltage is limited."""
     seen = par.count * ops.floor(x.theta / par.count + 0.5)
     error = par.k_angle * (u.target - seen) - (seen - m.seen) / par.T_s
     wanted = par.k_p * error + m.v_i

@@ -33,7 +33,8 @@ void emulated(unsigned blocks, unsigned threads, void **given) {
   for (blockIdx.x = 0; blockIdx.x < blocks; ++blockIdx.x)
     for (threadIdx.x = 0; threadIdx.x < threads; ++threadIdx.x)
       bw_run_cases(*(double **)given[0], *(double *)given[1], *(double **)given[2],
-          *(double **)given[3], *(int64_t **)given[4], *(double **)given[5]);
+          *(double **)given[3], *(int64_t **)given[4], *(double **)given[5],
+          *(double **)given[6]);
 }
 """
 
@@ -77,12 +78,21 @@ class EmulatedDriver:
         self.capacity, self.count = capacity, 1
         self.started: Any = OK
         self.places: dict[int, Any] = {}
+        self.locked: dict[int, Any] = {}  # this machine's memory
         self.launches: list[int] = []  # threads of each
         self.most = 0  # bytes that were taken at once
 
     @property
     def taken(self) -> int:
         return sum(len(each) for each in self.places.values())
+
+    def left(self, place: int) -> int:
+        """Return the number of bytes from an address to the end of its memory."""
+        return next(
+            start + len(room) - place
+            for start, room in self.places.items()
+            if start <= place < start + len(room)
+        )
 
     def cuInit(self, flags: int) -> Any:
         if isinstance(self.started, Exception):
@@ -103,6 +113,19 @@ class EmulatedDriver:
 
     def cuDevicePrimaryCtxRetain(self, device: int) -> Any:
         return OK, "context"
+
+    def cuDevicePrimaryCtxSetFlags(self, device: int, flags: int) -> Any:
+        return (OK,)
+
+    def cuMemHostAlloc(self, size: int, flags: int) -> Any:
+        room = ctypes.create_string_buffer(size)
+        ctypes.memset(room, 0xFF, size)
+        self.locked[ctypes.addressof(room)] = room
+        return OK, ctypes.addressof(room)
+
+    def cuMemFreeHost(self, place: int) -> Any:
+        del self.locked[place]
+        return (OK,)
 
     def cuCtxSetCurrent(self, context: str) -> Any:
         assert context == "context"
@@ -128,12 +151,12 @@ class EmulatedDriver:
         return (OK,)
 
     def cuMemcpyHtoD(self, place: int, array: int, size: int) -> Any:
-        assert size <= len(self.places[place])
+        assert size <= self.left(place)
         ctypes.memmove(place, array, size)
         return (OK,)
 
     def cuMemcpyDtoH(self, array: int, place: int, size: int) -> Any:
-        assert size <= len(self.places[place])
+        assert size <= self.left(place)
         ctypes.memmove(array, place, size)
         return (OK,)
 

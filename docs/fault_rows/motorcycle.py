@@ -39,11 +39,11 @@ PHASE = (
 LATE = (
     "with a delay of five ticks, the current loop is unstable. Its phase "
     "crosses -180 degrees at 44 Hz, where its gain is 1.28. Without dither, "
-    "it oscillates at 41 Hz with 18 A. It amplifies the 50 Hz dither by a factor of 4.6 to 13.5 "
+    "it oscillates at 41 Hz with 18 A. It amplifies the 50 Hz dither by a factor of 4.6, to 13.5 "
     "A, in addition to 3.6 A at 41 Hz. Near the resonance, the result depends strongly on the "
     "gain. With 10 % more or less integral gain, the ripple is 12.1 or 8.1 A. With 17 % less, it"
     " is 7 A. "
-    "The definition of the stated figure is not known. In the computed "
+    "The definition of the reference value is not known. In the computed "
     "current, half the range is 17.3 A, the mean deviation is 8.8 A, and the "
     "difference from the fault-free current is 6.5 A"
 )
@@ -76,7 +76,7 @@ def _supply() -> list[Row]:
     return [
         Row(
             "battery.lost",
-            "below 5 bar after",
+            "time until the pressure is below 5 bar",
             520.0,
             "ms",
             passes(one("battery.lost"), 5.0),
@@ -87,7 +87,7 @@ def _supply() -> list[Row]:
         ),
         Row(
             "battery.shorted",
-            "below 5 bar after",
+            "time until the pressure is below 5 bar",
             1250.0,
             "ms",
             passes(one("battery.shorted"), 5.0),
@@ -111,7 +111,7 @@ def _supply() -> list[Row]:
         ),
         Row(
             "bridge.open-phase",
-            "below 5 bar after",
+            "time until the pressure is below 5 bar",
             520.0,
             "ms",
             passes(one("bridge.open-phase"), 5.0),
@@ -123,7 +123,11 @@ def _supply() -> list[Row]:
             for fault in (one("bridge.stuck", duty),)
             for row in (
                 Row(
-                    f"bridge.stuck {duty:g}", "above 45 bar after", after, "ms", passes(fault, 45.0)
+                    f"bridge.stuck {duty:g}",
+                    "time until the pressure is above 45 bar",
+                    after,
+                    "ms",
+                    passes(fault, 45.0),
                 ),
                 Row(f"bridge.stuck {duty:g}", "steady pressure", (52.0, 54.0), "bar", ends(fault)),
                 Row(f"bridge.stuck {duty:g}", "current", current, "A", ends(fault, "i", 1.0)),
@@ -150,9 +154,9 @@ def _motor_and_sensors() -> list[Row]:
             1.43,
             "1",
             current_ratio,
-            "the ECU's parameters are for strong magnets, so its dither is also weaker. The "
+            "the ECU's parameters assume strong magnets, so its dither is also weaker. The "
             "piston sticks permanently, and friction supports part of the load. With the correct"
-            " torque constant in the ECU, the figure is 1.42",
+            " torque constant in the ECU, the value is 1.42",
         ),
         Row("current.stuck 0", "peak", 45.5, "bar", most(one("current.stuck", "0 A"))),
         Row("current.stuck 0", "time of the peak", 36.0, "ms", peak_time),
@@ -196,7 +200,7 @@ def _motor_and_sensors() -> list[Row]:
             for row in (
                 Row(
                     f"pressure.stuck {level} bar",
-                    "above 45 bar after",
+                    "time until the pressure is above 45 bar",
                     after,
                     "ms",
                     passes(fault, 45.0),
@@ -206,7 +210,7 @@ def _motor_and_sensors() -> list[Row]:
         ),
         Row(
             "pressure.stuck 50 bar",
-            "below 5 bar after",
+            "time until the pressure is below 5 bar",
             96.0,
             "ms",
             passes(one("pressure.stuck", "50 bar"), 5.0),
@@ -240,7 +244,7 @@ def _controller() -> list[Row]:
         Row("bridge.late 5", "peak", 38.5, "bar", most(one("bridge.late", 5))),
         Row(
             "bridge.late 5",
-            "ripple of the current, standard deviation",
+            "standard deviation of the current ripple",
             7.0,
             "A",
             lambda: float(recording(one("bridge.late", 5))["i"].values[-1000:].std()),
@@ -248,7 +252,7 @@ def _controller() -> list[Row]:
         ),
         Row(
             "bridge.late 5",
-            "ripple of the current with 17 % less integral gain",
+            "current ripple with 17 % less integral gain",
             None,
             "A",
             late_with_less,
@@ -287,7 +291,7 @@ def _controller() -> list[Row]:
             "bar",
             ends(one("p_set.lost")),
         ),
-        Row("gear.jammed", "pressure does not change", 37.0, "bar", ends(one("gear.jammed"))),
+        Row("gear.jammed", "pressure after the fault", 37.0, "bar", ends(one("gear.jammed"))),
     ]
 
 
@@ -311,7 +315,7 @@ def _fluid() -> list[Row]:
         *(
             Row(
                 f"{fault} {g}",
-                "below 5 bar after",
+                "time until the pressure is below 5 bar",
                 after,
                 "ms",
                 passes(one(fault, f"{g} {CONDUCTANCE}"), 5.0),
@@ -328,7 +332,7 @@ def _fluid() -> list[Row]:
         ),
         Row(
             "caliper.heated 5 ml",
-            "drag pressure after 30 K",
+            "drag pressure after heating by 30 K",
             (7.0, 13.0),
             "bar",
             lambda: 30.0 * expansion(5e-6, 6.0),
@@ -343,7 +347,7 @@ def _fluid() -> list[Row]:
         ),
         Row(
             "caliper.heated 64 ml",
-            "pressure rise of all fluid, compliant line",
+            "pressure rise with all fluid heated, compliant line",
             3.1,
             "bar/K",
             lambda: expansion(64e-6, 1.0),

@@ -175,8 +175,8 @@ FIVEFOLD = (
     "4 um, 1.19 at 8 um, 1.07 at 12 um and 0.98 at 20 um"
 )
 STANDING = (
-    "2 mu_B r_B K_cal times the peak-to-peak runout is 21.0 N m, and five times this value with "
-    "five times the runout"
+    "2 mu_B r_B K_cal times the peak-to-peak runout is 21.0 N m. With five times the runout, the "
+    "ripple is five times as large"
 )
 CREEP = (
     "0.1 mm corresponds to 0.863 rad at the motors, which takes 7.19 ms at the gap mode's 120 "
@@ -201,7 +201,7 @@ def _motors() -> list[Row]:
         Row("power.stuck 1", "drift", 0.0, "m", figure("drift", hold)),
         Row(
             "power.stuck 1",
-            "reaches the end stop without friction at mu_B 0.45",
+            "end stop reached (1: yes) without friction at mu_B 0.45",
             1.0,
             "1",
             at_stop(hold, friction(0.45) + BARE),
@@ -249,7 +249,7 @@ def _motors() -> list[Row]:
             (0.0, 40.0),
             "um",
             moved,
-            "26 um of the travel are free play. The other 27 um come from the spring of 24 N/um,"
+            "26 um of the travel is free play. The other 27 um come from the spring of 24 N/um,"
             " which presses the wedge against the jammed screw with 647 N and then relaxes",
         ),
         Row(
@@ -279,7 +279,7 @@ def _sensors() -> list[Row]:
             "A",
             lambda: float(np.abs(rows_of("i_1", 0.0, *WOUND)).max()),
         ),
-        Row("moment.stuck 0", "reaches the end stop", 1.0, "1", at_stop(*WOUND)),
+        Row("moment.stuck 0", "end stop reached (1: yes)", 1.0, "1", at_stop(*WOUND)),
     ]
 
 
@@ -300,7 +300,13 @@ def _mechanics() -> list[Row]:
             "N m",
             lambda: float(np.abs(rows_of("M_B", 0.0, *LOST, onset=FROM_START)).max()),
         ),
-        Row("caliper.pad-lost", "reaches the end stop", 1.0, "1", at_stop(*LOST, onset=FROM_START)),
+        Row(
+            "caliper.pad-lost",
+            "end stop reached (1: yes)",
+            1.0,
+            "1",
+            at_stop(*LOST, onset=FROM_START),
+        ),
         Row(
             "heart.worn 5",
             "preload without power",

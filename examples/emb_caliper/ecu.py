@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from bywire.authoring import Limited, Signal
+from bywire.authoring import Limited, Signal, joined
 from bywire.control import current_pi
 from bywire.core import ops
-from bywire.plant import adc, h_bridge
-from emb_caliper.elements import ball_screw, floating_caliper, planetary_gear
+from bywire.plant import adc, current_sensor, floating_caliper, h_bridge
+from emb_caliper import estimation
+from emb_caliper.elements import ball_screw, planetary_gear
 from emb_caliper.laws import limited_pi
 from emb_caliper.parameters import CaliperBrakeParameters as Par
 
@@ -25,10 +26,12 @@ class Stimulus(NamedTuple):
     i_set: Annotated[float, Signal("A", "current demand", 10.0)]
     v_set: Annotated[float, Signal("V", "voltage demand", 10.0)]
     noise_F: Annotated[float, Signal("1", "force channel noise")]
+    noise_i: Annotated[float, Signal("1", "current channel noise")]
+    noise_i_2: Annotated[float, Signal("1", "noise of the second current channel")]
 
 
-class Memory(NamedTuple):
-    """Memory of the ECU between its ticks."""
+class DriveMemory(NamedTuple):
+    """Memory of the cascade between its ticks."""
 
     F_meas: Annotated[float, Signal("N", "measured clamp force", 1e4)]
     theta_meas: Annotated[float, Signal("rad", "measured motor angle", 50.0)]
@@ -42,28 +45,46 @@ class Memory(NamedTuple):
     sat_speed: Annotated[float, Signal("1", "speed demand saturated")]
     sat_current: Annotated[float, Signal("1", "current demand saturated")]
     sat_duty: Annotated[float, Signal("1", "duty cycle saturated")]
-    force_integral: Annotated[float, Signal("rad/s", "integral part of the force PI", 10.0)]
-    speed_integral: Annotated[float, Signal("A", "integral part of the speed PI", 5.0)]
-    current_integral: Annotated[float, Signal("1", "integral part of the current PI", 0.3)]
+    force_integral: Annotated[float, Signal("rad/s", "integral term of the force PI", 10.0)]
+    speed_integral: Annotated[float, Signal("A", "integral term of the speed PI", 5.0)]
+    current_integral: Annotated[float, Signal("1", "integral term of the current PI", 0.3)]
+
+
+Memory: Any = joined(__name__, "Memory", DriveMemory, estimation.Memory)
+"""memory of the ECU between its ticks"""
 
 
 class Readings(NamedTuple):
-    """Sensor readings at a tick. Resolver and current sensor are ideal."""
+    """Sensor readings at a tick. The speed is ideal."""
 
-    F_cl: Annotated[float, Signal("N", "clamp force", 1e4)]
+    F_cell: Annotated[float, Signal("N", "reading of the load cell", 1e4)]
     theta: Annotated[float, Signal("rad", "motor angle", 50.0)]
     omega: Annotated[float, Signal("rad/s", "motor speed", 100.0)]
     i: Annotated[float, Signal("A", "motor current", 10.0)]
 
 
 def force_tick(r: Any, m: Any, u: Stimulus, par: Any) -> Any:
-    """Read the force sensor, and run force control once to update the speed set point."""
-    share = adc.sample(r.F_cl / par.F_span, u.noise_F, par.adc)
+    """Read the load cell, and run force control once to update the speed set point."""
+    share = adc.sample(r.F_cell / par.F_span, u.noise_F, par.adc)
     m = m._replace(F_meas=share * par.F_span, theta_meas=r.theta)
+    m = estimation.fed_back(m, par)
     return _force_control(m, u, par) if par.drive == "force" else m
 
 
-def speed_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+def estimate_tick(r: Readings, m: Any, u: Stimulus, par: Par) -> Any:
+    """Advance the estimate of the clamp force by one sample."""
+    return estimation.estimated(r.theta, measured_current(r.i, u.noise_i, par), m, par)
+
+
+def measured_current(i: float, noise: float, par: Any) -> float:
+    """Return a current as the ECU measures it."""
+    if par.current_adc.law == "ideal":
+        return i
+    share = adc.sample(current_sensor.reading(i, par.current), noise, par.current_adc)
+    return current_sensor.value(share, par.current)
+
+
+def speed_tick(r: Readings, m: Any, u: Stimulus, par: Par) -> Any:
     """Run speed control of a DC motor once to update the current set point."""
     return speed_control(r, m, u, par, par.motor.K_e)
 
@@ -83,14 +104,16 @@ def speed_control(r: Any, m: Any, u: Stimulus, par: Any, K_t: float) -> Any:
     return m._replace(i_ref=out.i, sat_current=saturated, speed_integral=state.integral)
 
 
-def current_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+def current_tick(r: Readings, m: Any, u: Stimulus, par: Par) -> Any:
     """Run current control once."""
     if par.drive == "current":
         m = m._replace(i_ref=u.i_set)
+    i = measured_current(r.i, u.noise_i, par)
+    m = estimation.summed(i, m, par)
     limit = h_bridge.limited(par.ecu.current.D_max, par.bridge)
     state, out = current_pi.output(
         current_pi.State(m.current_integral),
-        current_pi.Input(i_ref=m.i_ref, i_meas=r.i, D_lim=limit),
+        current_pi.Input(i_ref=m.i_ref, i_meas=i, D_lim=limit),
         par.ecu.T_current,
         par.ecu.current,
     )
@@ -113,7 +136,7 @@ def _force_control(m: Any, u: Stimulus, par: Any) -> Any:
     ecu = par.ecu
     state, out = limited_pi.force(
         limited_pi.ForceState(m.force_integral),
-        limited_pi.ForceInput(u.F_set - m.F_meas, _factor(m, par)),
+        limited_pi.ForceInput(u.F_set - m.F_used, _factor(m, par)),
         ecu.T_force,
         ecu.force,
     )
@@ -142,4 +165,4 @@ def _ahead(m: Any, par: Any, K_t: float) -> float:
     """Return the feed-forward current [A]."""
     if par.ecu.load == "off":
         return 0.0
-    return travel_per_angle(par) * ops.fmax(m.F_meas, 0.0) / K_t
+    return travel_per_angle(par) * ops.fmax(m.F_used, 0.0) / K_t

@@ -7,19 +7,28 @@ while the rotor turns.
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from bywire.authoring import Signal
+from bywire.authoring import Signal, joined
 from bywire.control import field_oriented
-from emb_caliper import ecu
-from emb_caliper.ecu import Stimulus, force_tick, source_tick
+from bywire.plant import inverter
+from emb_caliper import ecu, estimation
+from emb_caliper.ecu import Stimulus, force_tick, measured_current, source_tick
 from emb_caliper.parameters import SynchronousBrakeParameters as Par
 
-__all__ = ["Memory", "Readings", "current_tick", "force_tick", "source_tick", "speed_tick"]
+__all__ = [
+    "Memory",
+    "Readings",
+    "current_tick",
+    "estimate_tick",
+    "force_tick",
+    "source_tick",
+    "speed_tick",
+]
 
 
-class Memory(NamedTuple):
-    """Memory of the ECU between its ticks. Duties are voltages per bus voltage."""
+class DriveMemory(NamedTuple):
+    """Memory of the cascade between its ticks. Duties are voltages per bus voltage."""
 
     F_meas: Annotated[float, Signal("N", "measured clamp force", 1e4)]
     theta_meas: Annotated[float, Signal("rad", "measured motor angle", 50.0)]
@@ -38,17 +47,21 @@ class Memory(NamedTuple):
     sat_speed: Annotated[float, Signal("1", "speed demand saturated")]
     sat_current: Annotated[float, Signal("1", "current demand saturated")]
     sat_duty: Annotated[float, Signal("1", "voltage saturated")]
-    force_integral: Annotated[float, Signal("rad/s", "integral part of the force PI", 10.0)]
-    speed_integral: Annotated[float, Signal("A", "integral part of the speed PI", 5.0)]
-    z_d: Annotated[float, Signal("V", "d-axis integral part of the current PI", 1.0)]
-    z_q: Annotated[float, Signal("V", "q-axis integral part of the current PI", 1.0)]
+    force_integral: Annotated[float, Signal("rad/s", "integral term of the force PI", 10.0)]
+    speed_integral: Annotated[float, Signal("A", "integral term of the speed PI", 5.0)]
+    z_d: Annotated[float, Signal("V", "d-axis integral term of the current PI", 1.0)]
+    z_q: Annotated[float, Signal("V", "q-axis integral term of the current PI", 1.0)]
     i_fw: Annotated[float, Signal("A", "field-weakening current", 1.0)]
 
 
-class Readings(NamedTuple):
-    """Sensor readings at a tick. Sensors of currents, speed and bus voltage are ideal."""
+Memory: Any = joined(__name__, "Memory", DriveMemory, estimation.Memory)
+"""memory of the ECU between its ticks"""
 
-    F_cl: Annotated[float, Signal("N", "clamp force", 1e4)]
+
+class Readings(NamedTuple):
+    """Sensor readings at a tick. Speed and bus voltage are ideal."""
+
+    F_cell: Annotated[float, Signal("N", "reading of the load cell", 1e4)]
     theta: Annotated[float, Signal("rad", "motor angle", 50.0)]
     omega: Annotated[float, Signal("rad/s", "motor speed", 100.0)]
     i_alpha: Annotated[float, Signal("A", "current on the alpha axis", 10.0)]
@@ -56,22 +69,41 @@ class Readings(NamedTuple):
     V_dc: Annotated[float, Signal("V", "bus voltage", 40.0)]
 
 
-def speed_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+def estimate_tick(r: Readings, m: Any, u: Stimulus, par: Par) -> Any:
+    """Advance the estimate of the clamp force by one sample, from the torque-producing current."""
+    return estimation.estimated(r.theta, _torque_current(r, u, par), m, par)
+
+
+def _torque_current(r: Readings, u: Stimulus, par: Par) -> float:
+    """Return the torque-producing current as the ECU measures it."""
+    i_alpha, i_beta = _currents(r, u, par)
+    _, i_q = inverter.rotated(i_alpha, i_beta, par.ecu.current.p * r.theta)
+    return i_q
+
+
+def _currents(r: Readings, u: Stimulus, par: Par) -> tuple[float, float]:
+    """Return the stator's currents as the ECU measures them."""
+    return measured_current(r.i_alpha, u.noise_i, par), measured_current(r.i_beta, u.noise_i_2, par)
+
+
+def speed_tick(r: Readings, m: Any, u: Stimulus, par: Par) -> Any:
     """Run speed control once to update the current set point."""
     law = par.ecu.current
     return ecu.speed_control(r, m, u, par, 1.5 * law.p * law.psi_hat)
 
 
-def current_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+def current_tick(r: Readings, m: Any, u: Stimulus, par: Par) -> Any:
     """Apply the duties of the last tick, and run field-oriented control once for the next one."""
     if par.drive == "current":
         m = m._replace(i_ref=u.i_set)
+    m = estimation.summed(_torque_current(r, u, par), m, par)
+    i_alpha, i_beta = _currents(r, u, par)
     state, out = field_oriented.output(
         field_oriented.State(m.z_d, m.z_q, m.i_fw),
         field_oriented.Input(
             i_ref=m.i_ref,
-            i_alpha=r.i_alpha,
-            i_beta=r.i_beta,
+            i_alpha=i_alpha,
+            i_beta=i_beta,
             theta_e=par.ecu.current.p * r.theta,
             omega=r.omega,
             V_dc=r.V_dc,

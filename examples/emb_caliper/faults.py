@@ -9,6 +9,7 @@ CHANNELS = Channels(
     (
         Channel("encoder", "motor encoder", "rad", "theta", offset=0.5),
         Channel("current", "current sensor", "A", "i", offset=1.0),
+        Channel("force", "load cell", "N", "F_cell", offset=1e3),
         Channel("bridge", "bridge", "1", "duty", "drive", stuck=1.0, task="current"),
     ),
 )
@@ -16,5 +17,8 @@ CHANNELS = Channels(
 # The fault encoder.turned of its element turns only the reading.
 PMSM_CHANNELS = Channels(
     "emb-caliper-pmsm",
-    (Channel("current", "current sensors (q axis)", "A", "i_q", offset=1.0),),
+    (
+        Channel("current", "current sensors (q axis)", "A", "i_q", offset=1.0),
+        Channel("force", "load cell", "N", "F_cell", offset=1e3),
+    ),
 )

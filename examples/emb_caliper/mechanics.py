@@ -8,10 +8,10 @@ from typing import Any, ClassVar, TypeVar
 
 from bywire.authoring import Assembly, Bounds, Task
 from bywire.core import ops
-from bywire.plant import end_stop
+from bywire.plant import end_stop, floating_caliper, pad_hysteresis
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
+    load_cell,
     load_friction,
     planetary_gear,
     rotor,
@@ -51,12 +51,17 @@ class CaliperBrake(Assembly[ParT, MemoryT]):
         w.pads.u = floating_caliper.Input(piston.x, piston.v)
         stop = w.par.stop
         w.stop.u = end_stop.Input(piston.x, piston.v, stop.x_rest, stop.x_end)
-        force = w.pads.f.F_cl + end_stop.load(w.stop.f)
+        w.hysteresis.u = pad_hysteresis.Input(piston.v, w.pads.f.F_cl)
+        w.F_pads = (
+            w.pads.f.F_cl + pad_hysteresis.output(w.hysteresis.x, w.hysteresis.par).F_hysteresis
+        )
+        w.force.u = load_cell.Input(w.F_pads)
+        force = w.F_pads + end_stop.load(w.stop.f)
         carrier = _carrier(w.rotor.x, w.par)
         w.screw.u = ball_screw.Input(carrier.theta, carrier.omega, force)
         load = ball_screw.output(w.screw.u, w.screw.par).load
         w.gear.u = planetary_gear.Input(w.rotor.x.theta, w.rotor.x.omega, load)
-        w.dry.u = load_friction.Input(w.rotor.x.omega, w.pads.f.F_cl)
+        w.dry.u = load_friction.Input(w.rotor.x.omega, w.F_pads)
         load = planetary_gear.output(w.gear.u, w.gear.par).load
         w.rotor.u = rotor.Input(w.torque, load, 0.0)
 
@@ -76,6 +81,7 @@ class CaliperBrake(Assembly[ParT, MemoryT]):
     def record(self, w: Any) -> dict[str, float]:
         """Return the recorded signals other than states, wires and losses."""
         return {
+            "F_cl": w.F_pads,
             "T_fr": -w.reaction[0],
             "F_stop": end_stop.load(w.stop.f),
             "stuck": ops.where(w.rotor.x.omega == 0, 1.0, 0.0),
@@ -90,7 +96,9 @@ class CaliperBrake(Assembly[ParT, MemoryT]):
             return (Task("source", par.ecu.T_current, self.sensed(laws.source_tick)),)
         if par.drive == "current":
             return (current,)
-        slow = ("force", laws.force_tick), ("speed", laws.speed_tick)
+        slow = [("force", laws.force_tick), ("speed", laws.speed_tick)]
+        if par.ecu.estimation == "on":
+            slow.insert(0, ("estimate", laws.estimate_tick))
         outer = tuple(Task(name, par.ecu.T_force, self.sensed(law)) for name, law in slow)
         return (*outer, current)
 
@@ -110,9 +118,3 @@ def travel(x: rotor.State, par: Any) -> ball_screw.Output:
 
 def _carrier(x: rotor.State, par: Any) -> planetary_gear.Output:
     return planetary_gear.output(planetary_gear.Input(x.theta, x.omega, 0.0), par.gear)
-
-
-def clamp_force(x: Any, par: Any) -> float:
-    """Return the clamp force [N] that the force sensor measures, at any state of the brake."""
-    piston = travel(rotor.State(x.theta, x.omega), par)
-    return floating_caliper.forces(floating_caliper.Input(piston.x, piston.v), par.caliper).F_cl

@@ -7,20 +7,28 @@ from types import ModuleType
 from typing import Any, ClassVar, Self
 
 from bywire.authoring import Integral, Part, Role, Shown, Wire
-from bywire.plant import battery_supply, dc_motor, end_stop, h_bridge
+from bywire.plant import (
+    angle_sensor,
+    battery_supply,
+    dc_motor,
+    end_stop,
+    floating_caliper,
+    h_bridge,
+    pad_hysteresis,
+)
 from emb_caliper import ecu
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
+    load_cell,
     load_friction,
     planetary_gear,
     rotor,
 )
-from emb_caliper.mechanics import CaliperBrake, clamp_force
+from emb_caliper.mechanics import CaliperBrake
 from emb_caliper.parameters import CaliperBrakeParameters as Par
 
 
-class EmbCaliper(CaliperBrake[Par, ecu.Memory]):
+class EmbCaliper(CaliperBrake[Par, Any]):
     """The brake with a DC motor."""
 
     name: ClassVar[str] = "emb-caliper"
@@ -40,12 +48,15 @@ class EmbCaliper(CaliperBrake[Par, ecu.Memory]):
     pads = Part(
         floating_caliper, par="caliper", output=("F_cl",), work="W_caliper", loss="E_caliper"
     )
+    hysteresis = Part(pad_hysteresis, loss="E_hysteresis")
+    force = Part(load_cell)
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
     t_stuck = Integral("s", "time stuck", role=Role("standstill"))
 
     voltage = Wire("V", "motor voltage", 10.0)
     i_dc = Wire("A", "battery current", 10.0)
     torque = Wire("N*m", "motor torque", 1.0)
+    F_pads = Wire("N", "clamp force", 1e4)
     T_fr = Shown("N*m", "friction torque", 0.1)
     F_stop = Shown("N", "end stop load on the piston", 1e3)
     stuck = Shown("1", "shaft stuck")
@@ -55,6 +66,17 @@ class EmbCaliper(CaliperBrake[Par, ecu.Memory]):
         "F_cl",
         "F_ref",
         "F_meas",
+        "F_used",
+        "F_hat",
+        "F_curve",
+        "F_balance",
+        "balance_valid",
+        "on_estimate",
+        "theta_0_hat",
+        "s_hat",
+        "C_hat",
+        "G_hat",
+        "strokes",
         "x",
         "theta",
         "omega",
@@ -78,6 +100,7 @@ class EmbCaliper(CaliperBrake[Par, ecu.Memory]):
         "E_viscous",
         "E_friction",
         "E_caliper",
+        "E_hysteresis",
         "E_stop",
         "E_stored",
         "t_stuck",
@@ -96,7 +119,7 @@ class EmbCaliper(CaliperBrake[Par, ecu.Memory]):
             return w.voltage * w.motor.x.i
         return battery_supply.power_source(w.supply.u, w.supply.par)
 
-    def sensed(self, law: Callable[..., ecu.Memory]) -> Callable[[Any, Any, Any, Any], ecu.Memory]:
+    def sensed(self, law: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
         """Return a controller's tick with the sensor readings."""
         return _reading(law)
 
@@ -112,10 +135,11 @@ def _electrics(w: EmbCaliper) -> tuple[float, float]:
     return bridge.v, bridge.i_dc
 
 
-def _reading(law: Callable[..., ecu.Memory]) -> Callable[[Any, Any, Any, Any], ecu.Memory]:
+def _reading(law: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
     """Return a controller's tick with the sensor readings."""
 
-    def tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
-        return law(ecu.Readings(clamp_force(x, par), x.theta, x.omega, x.i), m, u, par)
+    def tick(x: Any, m: Any, u: ecu.Stimulus, par: Par) -> Any:
+        theta = angle_sensor.reading(x.theta, par.encoder)
+        return law(ecu.Readings(x.F_cell, theta, x.omega, x.i), m, u, par)
 
     return tick

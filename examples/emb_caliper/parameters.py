@@ -6,26 +6,34 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from bywire.authoring import Duration, ParameterSet, Unit
-from bywire.control import current_pi, field_oriented
+from bywire.authoring import Duration, ParameterSet, TorqueConstant, Unit
+from bywire.control import (
+    clamp_force_estimator,
+    clamp_force_training,
+    current_pi,
+    field_oriented,
+)
 from bywire.plant import (
     adc,
     angle_sensor,
     battery_supply,
+    current_sensor,
     dc_motor,
     end_stop,
+    floating_caliper,
     h_bridge,
     inverter,
+    pad_hysteresis,
     pmsm,
 )
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
+    load_cell,
     load_friction,
     planetary_gear,
     rotor,
 )
-from emb_caliper.laws import limited_pi
+from emb_caliper.laws import force_monitor, limited_pi
 
 Force = Annotated[float, Unit("N", 1e4), Field(gt=0, allow_inf_nan=False)]
 Position = Annotated[float, Unit("m", 1e-3), Field(allow_inf_nan=False)]
@@ -57,7 +65,9 @@ class CascadeParameters(ParameterSet):
 
     ``scheduling``: ``"stiffness"`` divides the gains of the force controller by the expected
     stiffness at the piston travel, relative to the stiffness at first contact. ``load``:
-    ``"fed-forward"`` adds the current that the measured force needs without friction.
+    ``"fed-forward"`` adds the current that the force needs without friction. ``feedback``: the
+    force that the ECU controls. With ``"fallback"``, the estimate replaces a load cell that
+    disagrees with it.
     """
 
     T_force: Duration
@@ -72,8 +82,17 @@ class CascadeParameters(ParameterSet):
     """whether the gains of the force controller follow the stiffness"""
     load: Literal["off", "fed-forward"]
     """whether feed-forward adds the current that holds the force"""
+    feedback: Literal["sensor", "fallback", "estimate"]
+    """source of the clamp force for control"""
+    estimation: Literal["off", "on"]
+    """whether the ECU estimates the clamp force"""
+    K_t_hat: TorqueConstant
+    """torque per current"""
     force: limited_pi.ForceParameters
     speed: limited_pi.SpeedParameters
+    estimator: clamp_force_estimator.Parameters
+    training: clamp_force_training.Parameters
+    monitor: force_monitor.Parameters
 
     @model_validator(mode="after")
     def _samples_fit(self) -> CascadeParameters:
@@ -82,6 +101,11 @@ class CascadeParameters(ParameterSet):
             raise ValueError(
                 f"T_force = {self.T_force:g} s must be a whole multiple of T_current = "
                 f"{self.T_current:g} s"
+            )
+        if self.feedback != "sensor" and self.estimation == "off":
+            raise ValueError(
+                f"feedback = {self.feedback} needs an estimate of the clamp force. Set "
+                "estimation = on, or feedback = sensor"
             )
         return self
 
@@ -99,20 +123,25 @@ class FieldOrientedEcuParameters(CascadeParameters):
 
 
 class CaliperBrakeParameters(ParameterSet):
-    """The whole brake with a DC motor: plant, force sensor and ECU."""
+    """The whole brake with a DC motor: plant, sensors and ECU."""
 
     supply: battery_supply.Parameters
     bridge: h_bridge.Parameters
     motor: dc_motor.Parameters
+    encoder: angle_sensor.Parameters
     rotor: rotor.Parameters
     friction: load_friction.Parameters
     gear: planetary_gear.Parameters
     screw: ball_screw.Parameters
     caliper: floating_caliper.Parameters
+    hysteresis: pad_hysteresis.Parameters
     stop: StopParameters
+    force: load_cell.Parameters
     F_span: Force
-    """full-scale clamp force of the force sensor"""
+    """full-scale clamp force of the load cell"""
     adc: adc.Parameters
+    current: current_sensor.Parameters
+    current_adc: adc.Parameters
     ecu: EcuParameters
     drive: DriveMode
     """quantity that the stimulus commands; "voltage" is an ideal source at the motor"""
@@ -135,10 +164,14 @@ class SynchronousBrakeParameters(ParameterSet):
     gear: planetary_gear.Parameters
     screw: ball_screw.Parameters
     caliper: floating_caliper.Parameters
+    hysteresis: pad_hysteresis.Parameters
     stop: StopParameters
+    force: load_cell.Parameters
     F_span: Force
-    """full-scale clamp force of the force sensor"""
+    """full-scale clamp force of the load cell"""
     adc: adc.Parameters
+    current: current_sensor.Parameters
+    current_adc: adc.Parameters
     ecu: FieldOrientedEcuParameters
     drive: DriveMode
     """quantity that the stimulus commands; "voltage" is an ideal source that turns with the rotor

@@ -6,10 +6,10 @@ from typing import Any
 
 from bywire.authoring import ParameterError, zeros
 from bywire.core import ops
-from bywire.plant import dc_motor, pmsm
+from bywire.plant import dc_motor, floating_caliper, pmsm
 from emb_caliper import ecu, ecu_pmsm
 from emb_caliper.ecu import travel_per_angle
-from emb_caliper.elements import floating_caliper, rotor
+from emb_caliper.elements import load_cell, rotor
 from emb_caliper.model import EmbCaliper
 from emb_caliper.models.pmsm import EmbCaliperPmsm
 from emb_caliper.parameters import BrakeParameters, torque_constant
@@ -58,10 +58,10 @@ def state_at(F: float, par: BrakeParameters) -> Any:
     """Return the state at rest at a clamp force [N]. At zero force the piston is parked at 0."""
     x = par.caliper.clearance + overlap_at(F, par) if F > 0.0 else 0.0
     i = holding_current(F, par)
-    turned = rotor.State(x / travel_per_angle(par), 0.0)
+    turned, cell = rotor.State(x / travel_per_angle(par), 0.0), load_cell.State(par.force.gain * F)
     if isinstance(par.motor, dc_motor.Parameters):
-        return EmbCaliper.state(motor=dc_motor.State(i), rotor=turned)
-    return EmbCaliperPmsm.state(motor=pmsm.State(0.0, i), rotor=turned)
+        return EmbCaliper.state(motor=dc_motor.State(i), rotor=turned, force=cell)
+    return EmbCaliperPmsm.state(motor=pmsm.State(0.0, i), rotor=turned, force=cell)
 
 
 def memory_at(F: float, par: BrakeParameters) -> Any:
@@ -69,6 +69,7 @@ def memory_at(F: float, par: BrakeParameters) -> Any:
     i, theta, v = holding_current(F, par), state_at(F, par).theta, holding_voltage(F, par)
     cascade = {
         "F_meas": F,
+        "F_used": F,
         "theta_meas": theta,
         "F_ref": F,
         "i_ref": i,

@@ -259,7 +259,7 @@ def test_report_shows_every_figure_and_progress_every_part(
     assert results == reproduction.as_object()
     assert {p.name for p in paths if p.suffix == ".png"} == {f"{name}.png" for name in names}
     assert {p.suffix for p in paths} == {".png", ".nc", ".html", ".json"}
-    for title in ("The paper contradicts itself: 31 of 68 judged statements", "Tolerances"):
+    for title in ("The paper contradicts itself: 31 of 68 judged values", "Tolerances"):
         assert f"<h2>{title}</h2>" in html
     assert sorted(label for label, share in STAGES if share == 1.0) == sorted(PARTS)
 

@@ -29,7 +29,7 @@ def test_steps_that_divide_the_period_of_the_ecu(step):
 
 @pytest.mark.parametrize("step", ["3 us", "30 us", "333 us", "2 ms", "1 s", "1e9 s"])
 def test_steps_that_do_not_are_refused(step):
-    with pytest.raises(StepError, match="does not divide the ecu interval of 1000 us"):
+    with pytest.raises(StepError, match="does not divide the ecu interval"):
         run_once(braking(step=step))
 
 

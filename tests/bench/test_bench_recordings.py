@@ -191,7 +191,7 @@ def test_engines_agree_on_every_signal():
 def test_a_run_whose_energy_balance_is_open_says_so(k_lf, is_open):
     """A nearly frictionless pipe lets a few grams of fluid reach absurd speeds."""
     result = run_once("hard-braking", {"pipeline.k_lf": k_lf})
-    said = [text for text in result.warnings if "the energy balance is off by" in text]
+    said = [text for text in result.warnings if "the energy balance has an error of" in text]
     assert bool(said) == is_open
     assert set(said) <= set(result.recordings["run"].attrs["warnings"])
 

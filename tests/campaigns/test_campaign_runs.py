@@ -216,7 +216,7 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ('below_share = "80 %"', 'above = "1 bar"\nbelow = "2 bar"', "needs exactly one of"),
         ('name = "too much"', 'name = "loss"', "occurs twice"),
         ("battery = 1", "batery = 1", "unknown fault in .rates. 'batery'"),
-        ('delay = "5 ms"', 'delay = "-5 ms"', "must be >= 0 s"),
+        ('delay = "5 ms"', 'delay = "-5 ms"', "must be >= 0 ms"),
         ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers can vary"),
         (
             'bench = "hard-braking"',
@@ -408,7 +408,7 @@ def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):
         "harmless"
     )
     shown = FaultCampaign(found)
-    assert str(shown).startswith("The reaction, bridge.open-phase, is harmful: ")
+    assert str(shown).count(", bridge.open-phase, is harmful: ") == 1
     assert next(iter(shown.as_object())) == "headline"
     banner = shown.document().banner
     assert banner.text.startswith("0 of 3 dangerous faults are undetected or detected too late. ")
@@ -429,9 +429,9 @@ def test_a_campaign_warns_of_what_its_runs_warn_of(campaign, tmp_path):
     (tmp_path / "clipped.toml").write_text(text.replace("healthy = 8", "healthy = 4"))
     found = bywire.run_faults(tmp_path / "clipped.toml")
     assert any(
-        "healthy run: the pressure leaves the sensor's range" in each for each in found.warnings
+        "fault-free run: the pressure leaves the sensor's range" in each for each in found.warnings
     )
-    assert not campaign.warnings or "healthy run" not in " ".join(campaign.warnings)
+    assert not campaign.warnings or "fault-free run" not in " ".join(campaign.warnings)
     doubtful = replace(campaign.findings.faults[0], doubts=("3 substeps hit the cap",))
     findings = replace(campaign.findings, faults=(doubtful, *campaign.findings.faults[1:]))
     assert findings.doubts == ("runs with 1 of the faults: 3 substeps hit the cap",)

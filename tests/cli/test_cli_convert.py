@@ -80,6 +80,7 @@ def test_there_and_back(bywire, run, tmp_path, out):
         (("run.csv", "run.csv", "--map", "map.toml"), "run.csv already exists"),
         (("run.csv", "out.csv", "--map", "map.toml"), "different times"),
         (("run.csv", "out.nc", "--map", "map.toml", "--signals", "p_cm"), "did you mean 'p_mc'"),
+        (("run.csv", "out.nc", "--signals", "p=pressure"), "Write pressure=p"),
         (("run.csv", "out.nc", "--map", "map.toml", "--rate", "5 ms"), "cannot be converted to Hz"),
         (("run.csv", "out.nc", "--map", "map.toml", "--rate", "0 Hz"), "must be > 0 Hz"),
         (("run.csv", "out.nc", "--map", "map.toml", "--method", "linear"), "Add a sample rate"),

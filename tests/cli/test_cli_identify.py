@@ -79,6 +79,7 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
             "frequency=p_mc",
             ("unknown stimulus 'frequency': valid names are p_set, pedal_force, i_set",),
         ),
+        ("Demand=p_set", ("Write --input p_set=Demand",)),
         ("p_set=", ("--input p_set= is not valid. Write STIMULUS=SIGNAL", "p_set=p_ref")),
     ],
 )
@@ -203,7 +204,7 @@ def test_refusals(bywire: Bywire, tmp_path: Path) -> None:
         ("1 bar, 3", "pressures.1 = '3'"),
         ("x", "commas"),
         ("1 bar", "must have at least 2 values, got '1 bar'"),
-        ("-1 bar, 1 bar", ">= 0 Pa"),
+        ("-1 bar, 1 bar", ">= 0 bar"),
     ):
         refused(
             bywire(

@@ -186,3 +186,16 @@ def test_refusals(bywire: Bywire, stop: Path) -> None:
         "All inputs of the model are p_set, ",
     )
     refused(bywire("replay", "none.csv", "--bench", "moment-pulses"), "none.csv")
+
+
+@pytest.mark.parametrize(
+    ("given", "right"),
+    [
+        (("--input", "Demand=M_set", "--output", "y_M"), "--input M_set=Demand"),
+        (("--output", "Moment=y_M [kN*m]"), '--output "y_M=Moment [kN*m]"'),
+    ],
+)
+def test_a_column_before_its_signal_is_swapped_in_the_error(
+    bywire: Bywire, stop: Path, given: tuple[str, ...], right: str
+) -> None:
+    refused(bywire("replay", stop, "--bench", "moment-pulses", *given), f"Write {right}")

@@ -35,7 +35,7 @@ import bywire as package
         ("motor.R_n=0.4ohm", ["unknown parameter 'motor.R_n'", "'motor.R_m'"]),
         ("motor.R_m=0.4", ["a pure number cannot be converted to ohm", "'0.5 ohm'"]),
         ("motor.R_m=9bar", ["bar cannot be converted to ohm"]),
-        ("motor.R_m=-1ohm", ["motor.R_m = -1.0 ohm", "> 0 ohm"]),
+        ("motor.R_m=-1ohm", ["motor.R_m = -1 ohm", "> 0 ohm"]),
         ("motor.R_m=nan", ["is not a quantity"]),
         ("simulation.stepp=1us", ["unknown key of [simulation] 'stepp'", "'step'"]),
         ("simulation.step=1e-30s", [">= 1e-09 s"]),

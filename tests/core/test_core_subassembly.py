@@ -42,7 +42,7 @@ def test_signals_get_prefix_label_and_book() -> None:
     assert Pair.frictions == ("left_omega", "right_omega")
     assert set(Pair.right.records) <= set(Pair.Output._fields)
     shown = signals_of(Pair.Output)
-    assert shown["left_torque"].label == "torque of the motor, left"
+    assert shown["left_torque"].label == "left: torque of the motor"
     assert shown["left_x_seen"].set_point_of == "left_theta"
     copper = shown["E_right_copper"].role
     assert copper is not None

@@ -77,7 +77,7 @@ def test_a_file_is_read_into_si() -> None:
         ({"inner": {"dely": 1}}, UnknownNameError, "unknown key of [inner] 'dely': did you mean"),
         ({"inner": {"delay": 5}}, UnitError, "[inner] delay = 5 has the wrong unit: a pure number"),
         ({"inner": {"delay": "5 bar"}}, UnitError, "[inner] delay = '5 bar' has the wrong unit"),
-        ({"inner": {"delay": "-5 ms"}}, ParameterError, "[inner] delay = '-5 ms' must be >= 0 s"),
+        ({"inner": {"delay": "-5 ms"}}, ParameterError, "[inner] delay = '-5 ms' must be >= 0 ms"),
         ({"inner": {"delay": True}}, UnitError, "[inner] delay = true must be one number"),
         (
             {"inner": {"share": "90 %"}},

@@ -142,7 +142,7 @@ def test_a_life_without_an_end_is_followed_as_long_as_asked(made):
 
 def test_a_brake_at_its_end_is_refused(made):
     made(lambda z: 1e-3)
-    with raises(ParameterError, name="lining left", value="0 mm", valid="above zero"):
+    with raises(ParameterError, name="lining left", value="0 mm", valid="> 0"):
         projected(_plan(_life(left=lambda z, par, wear: {"lining": 0.0})))
 
 

@@ -27,7 +27,9 @@ CHECK = check_valve.Parameters.create(
 CALIPER = stiffening_caliper.Parameters.create(
     {"V_1": 0.35 * CM3, "p_1": 4 * BAR, "c": 0.011 * CM3 / BAR}
 )
-STORE = accumulator.Parameters.create({"p_0": 1.5 * BAR, "k": BAR / CM3, "V_max": 3.5 * CM3})
+STORE = accumulator.Parameters.create(
+    {"p_0": 1.5 * BAR, "k": BAR / CM3, "V_max": 3.5 * CM3, "c_stop": 4e-15}
+)
 P_MASTER, PUMP = 120 * BAR, 3.318 * CM3
 DELAY, TAU = 1e-3, 1e-3
 STEP = 20e-6
@@ -56,7 +58,7 @@ def cycle():
         opened = commands(t)
         q_in = orifice.flow(orifice.Input(P_MASTER, p, lift_in), INLET, FLUID)
         q_back = check_valve.flow(check_valve.Input(p, P_MASTER), CHECK, FLUID)
-        p_store = accumulator.pressure(accumulator.State(V), STORE)
+        p_store = accumulator.pressure(accumulator.State(V), STORE, FLUID)
         q_out = orifice.flow(orifice.Input(p, p_store, lift_out), OUTLET, FLUID)
         q_pump = PUMP if V > 1e-4 * CM3 else min(PUMP, max(q_out, 0.0))
         f = stiffening_caliper.mass(stiffening_caliper.State(p), CALIPER)

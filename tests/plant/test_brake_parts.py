@@ -35,6 +35,7 @@ CHAMBER = {
     "F_s0": 420.0,
     "k_s": 8e3,
 }
+STORE = {"p_0": 1.5 * BAR, "k": BAR / 1e-6, "V_max": 3.5e-6, "c_stop": 4e-15}
 
 
 def test_a_chamber_moves_at_the_pressure_of_its_spring():
@@ -84,14 +85,26 @@ def test_a_stiffening_caliper_absorbs_volume_and_energy():
 
 
 def test_an_accumulator_stores_the_energy_of_its_spring():
-    values = {"p_0": 1.5 * BAR, "k": BAR / 1e-6, "V_max": 3.5e-6}
-    par, stiff = accumulator.Parameters.create(values), FLUID.replace({"beta": 1e15})
+    par, stiff = accumulator.Parameters.create(STORE), FLUID.replace({"beta": 1e15})
     W = accumulator.energy(accumulator.State(2e-6), par, stiff)
     assert pytest.approx(1.5 * BAR * 2e-6 + 0.5 * par.k * 4e-12, rel=1e-6) == W
 
 
+def test_the_pressure_of_an_accumulator_is_never_below_vacuum():
+    par = accumulator.Parameters.create(STORE)
+    V = np.array([-1e-3, -1e-6, -1e-9, 0.0, 1e-6, 3.5e-6, 3.502e-6])
+    p = np.array([accumulator.pressure(accumulator.State(v), par, FLUID) for v in V])
+    assert np.all(p > -FLUID.p_atm)
+    assert np.all(np.diff(p) > 0.0)
+    assert p[3:] / BAR == pytest.approx([1.5, 2.5, 5.0, 10.002], rel=1e-6)
+    gas = par.c_stop * (FLUID.p_atm + par.p_0)  # isothermal
+    for v, each in zip(-V[:3], p[:3], strict=True):
+        product = (each + FLUID.p_atm) * (gas + v)
+        assert product == pytest.approx((FLUID.p_atm + par.p_0) * gas, rel=1e-4)
+
+
 def test_an_accumulator_reports_that_it_is_full():
-    par = accumulator.Parameters.create({"p_0": 1.5 * BAR, "k": BAR / 1e-6, "V_max": 3.5e-6})
+    par = accumulator.Parameters.create(STORE)
     t = np.array([0.0, 0.1, 0.2])
     texts = accumulator.watch(t, accumulator.State(np.array([1e-6, 3.6e-6, 2e-6])), par)
     assert len(texts) == 1

@@ -103,7 +103,7 @@ def test_a_warning_says_which_boiling_point_is_passed_and_when():
     ("change", "text"),
     [
         ("T_1=700 degC", "T_1 = 700 degC must be < T_2 = 600 degC"),
-        ("T_a=-300 degC", "it must be > 0 K, got '-300 degC'"),
+        ("T_a=-300 degC", "T_a = -300 degC is not valid: it must be > -273.15 degC"),
         ("T_a=20", "cannot be converted to K"),
         ("f=1.2", "must be >= 0 and <= 1"),
         ("C_d=0 J/K", "must be > 0"),

@@ -71,14 +71,57 @@ BANNED = (
     Banned(r"\bagree[sd]? within\b", "they agree within 1 %", "agree to within"),
     Banned(r"\bType for example\b", "Type for example --at 2", "For example, type"),
     Banned(r"\bsooner or later\b", "one tick sooner or later", "earlier or later"),
+    Banned(
+        r"\b(?:integral|derivative|proportional) parts?\b",
+        "integral part of the current PI",
+        "integral term",
+    ),
+    Banned(r"\bcounts? as\b", "a slow shaft counts as locked", "is considered, is treated as"),
+    Banned(r"\bof the order of \d", "of the order of 65 %", "on the order of"),
+    Banned(r"\bturnover of\b", "2 J of a turnover of 9 J", "of 9 J transferred"),
+    Banned(r"\bcounts? fully\b", "dither counts fully", "is fully included"),
+    Banned(r"\bjudged statements?\b", "3 of 9 judged statements", "judged values"),
+    Banned(r"\bfused? products?\b", "without fused products", "fused multiply-add"),
+    Banned(
+        r"\b(?:agree[sd]?|match(?:es|ed)?) [^.;:|]{1,60}(?<!\bto )\bwithin \d",
+        "it agrees with the paper within 1 %",
+        "to within",
+    ),
+    Banned(r"\bmeasuring programs?\b", "spellings of measuring programs", "measurement program"),
+    Banned(r"\bfile borders?\b", "names that cross a file border", "file boundary"),
+    Banned(r"\b(?:brakes?|brake systems?) on air\b", "a truck's brake on air", "air brake"),
+    Banned(r"\bnext to other programs\b", "it ran next to other programs", "while others run"),
+    Banned(r"\bget(?:s)? one Newton\b", "terms get one Newton iteration", "bywire performs one"),
 )
-_ANY = re.compile("|".join(f"(?:{banned.pattern})" for banned in BANNED))
+IN_GUIDES = (
+    *BANNED,
+    Banned(r"\bcounts? as\b", "it counts as released", "is treated as, is considered"),
+    Banned(r"\bfrictions\b", "two frictions and a contact", "friction forces, friction states"),
+    Banned(r"\bhealthy runs?\b", "compared with a healthy run", "fault-free run"),
+    Banned(r"\b[Ii]ntegral part\b", "the integral part of the PID", "integral term, integrator"),
+    Banned(r"\bat the (?:[a-z]+ )?instant\b", "at the instant of the slip", "at the time"),
+    Banned(r"\b(?:finished|large|small|larger) share\b", "a finished share of 5 %", "fraction"),
+    Banned(r"\b(?:all|two|the stated) figures (?:agree|differ)", "all figures agree", "values"),
+    Banned(r"\bthe (?:outer|inner|left|slipping) one\b", "follows the left one", "the noun"),
+    Banned(r"\bwith file and line\b", "an error with file and line", "with the file and line"),
+    Banned(
+        r"\bcloser to (?:its|the) (?:limit|tolerance) than\b",
+        "it is closer to its limit than its error",
+        "the difference from the limit is smaller than",
+    ),
+)
+"""phrases of hand-written pages, which strings of the package may still contain"""
 _GENERATED = {"_build", "_generated"}
 PAGES = sorted(
     path
     for path in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("examples/*/*.md"))
     if not _GENERATED & set(path.parts)
 )
+GUIDES = [
+    path
+    for path in PAGES
+    if not re.match(r"notation|bench-ref", path.relative_to(ROOT).as_posix().removeprefix("docs/"))
+]
 TEXTS = sorted(path for ending in ("toml", "html", "js") for path in PACKAGE.rglob(f"*.{ending}"))
 Sentences = Iterable[tuple[int, str]]
 
@@ -104,25 +147,23 @@ def in_module(module: ast.Module) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.value
 
 
-def found(sentences: Sentences, path: Path = Path("text")) -> list[str]:
+def found(
+    sentences: Sentences, path: Path = Path("text"), phrases: tuple[Banned, ...] = BANNED
+) -> list[str]:
     """Return each banned phrase with its place and what to write instead."""
     return [
-        f"{path}:{line}: {hit[0]!r} (write: {instead(hit[0], text)})"
+        f"{path}:{line}: {hit[0]!r} (write: {banned.instead})"
         for line, text in sentences
         for text in [" ".join(text.split())]
-        for hit in _ANY.finditer(text)
+        for banned in phrases
+        for hit in re.finditer(banned.pattern, text)
     ]
-
-
-def instead(phrase: str, text: str) -> str:
-    """Return the advice of the first pattern that finds a phrase in a text."""
-    hits = (b for b in BANNED for hit in re.finditer(b.pattern, text) if hit[0] == phrase)
-    return next(hits).instead
 
 
 @pytest.mark.parametrize("path", PAGES, ids=label)
 def test_pages_are_in_plain_english(path):
-    assert not found(in_page(path.read_text(encoding="utf-8")), path.relative_to(ROOT))
+    phrases = IN_GUIDES if path in GUIDES else BANNED
+    assert not found(in_page(path.read_text(encoding="utf-8")), path.relative_to(ROOT), phrases)
 
 
 def test_strings_of_the_package_are_in_plain_english():
@@ -132,10 +173,10 @@ def test_strings_of_the_package_are_in_plain_english():
     assert not hits, "\n".join(hits)
 
 
-@pytest.mark.parametrize("banned", BANNED, ids=lambda banned: banned.example)
+@pytest.mark.parametrize("banned", IN_GUIDES, ids=lambda banned: banned.example)
 def test_every_pattern_finds_its_example(banned):
     assert re.search(banned.pattern, banned.example)
-    assert banned.instead in found([(1, banned.example)])[0]
+    assert banned.instead in found([(1, banned.example)], phrases=IN_GUIDES)[0]
 
 
 def test_a_planted_phrase_is_found_with_its_line():

@@ -107,8 +107,8 @@ def test_terminal_shows_contradictions_then_causes_counts_and_the_report(
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
     lines = str(made_up).splitlines()
-    assert lines[0] == "bywire contradicts the paper: 2 of 2 judged statements"
-    assert lines[1] == "The paper contradicts itself: 0 of 2 judged statements"
+    assert lines[0].startswith("bywire contradicts the paper: 2 of 2 ")
+    assert lines[1].startswith("The paper contradicts itself: 0 of 2 ")
     assert max(map(len, lines[:-2])) <= width + 8
     assert lines[-2].endswith("bywire reproduce made-up --out FOLDER")
     assert lines[-1].startswith("verdict: ")

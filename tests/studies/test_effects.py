@@ -65,7 +65,7 @@ def test_what_takes_the_figure_away_comes_first(findings):
     assert lost.drivers("peak_current") == ["adc.law", "motor.R_m", "motor.K_e"]
     assert [e.lacking for e in lost.effects("peak_current")] == [1, 0, 0]
     (tornado,) = (b for b in study_figures(lost, dict) if getattr(b, "name", "") == "tornado")
-    assert "A triangle means that the figure is not defined at some" in tornado.caption
+    assert "A triangle means" in tornado.caption
     assert any(
         text.get_text() == "not defined at a level"
         for text in tornado.figure.legends[0].get_texts()

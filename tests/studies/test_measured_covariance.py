@@ -87,7 +87,7 @@ def test_some_of_them_and_cut_off(study, written):
         ("{", "contains no estimates"),
         ({"estimates": {}}, "contains no estimates"),
         (estimate(value="0.3"), "not a number"),
-        (estimate(standard_deviation=0.0), "not above zero"),
+        (estimate(standard_deviation=0.0), "not > 0"),
         ({"estimates": [1, 2]}, "contains no estimates"),
         ("[" * 100_000, "contains no estimates"),
     ],

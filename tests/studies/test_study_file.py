@@ -185,7 +185,7 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
             '[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 5',
             ["[design] time = 5 has the wrong unit", "'1.5 s'"],
         ),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 0', ["time = 0 must be > 0 s"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 0', ["time = 0 must be > 0 ms"]),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = "+-5 %"\n[[correlation]]\n'
             'of = ["motor.R_m", "motor.K_e"]\nvalue = 1.0',

@@ -114,7 +114,7 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
     lacking = captions(found("rise_time", np.where(values < 0.06, values, np.nan), "<= 60 ms"))
     assert "Crosses" not in lacking["scatter-rise_time"]
     assert "(500)" in lacking["scatter-rise_time"]
-    assert lacking["parallel"].endswith("The line of a case without the figure goes to 'none'.")
+    assert lacking["parallel"].endswith("goes to 'none'.")
 
 
 def test_no_more_points_are_left_out_than_are_said(found):

@@ -139,9 +139,9 @@ def test_who_computes_is_chosen_by_the_work(monkeypatch):
         executor_of(0, "", 1)
     with pytest.raises(ParameterError, match="a cluster has its own workers"):
         executor_of(2, "tcp://host:8786", 1)
-    alone = executor_of(None, "", 1000, engine="cuda")
+    alone, shared = (executor_of(n, "", 1000, engine="cuda") for n in (1, 3))
     assert isinstance(alone, InProcess)
-    assert alone.together > 1
-    for workers, cluster in ((4, ""), (None, "tcp://host:8786")):
-        with raises(ParameterError, name="cluster" if cluster else "workers"):
-            executor_of(workers, cluster, 1000, engine="cuda")
+    assert isinstance(shared, Pool)
+    assert alone.together == shared.together > 1
+    with raises(ParameterError, name="cluster"):
+        executor_of(None, "tcp://host:8786", 1000, engine="cuda")

@@ -1,6 +1,6 @@
-"""PI controllers of the cascade, each with a limit at which its integral part stops.
+"""PI controllers of the cascade, each with a limit at which its integral term stops.
 
-Back-calculation would drive the integral part by the whole excess over the limit. A force step of
+Back-calculation would drive the integral term by the whole excess over the limit. A force step of
 25 kN demands three times the maximum speed, and the brake would then creep toward its demand.
 """
 
@@ -61,13 +61,13 @@ class SpeedInput(NamedTuple):
 class ForceState(NamedTuple):
     """Integral part."""
 
-    integral: Annotated[float, Signal("rad/s", "integral part of the force PI", 10.0)]
+    integral: Annotated[float, Signal("rad/s", "integral term of the force PI", 10.0)]
 
 
 class SpeedState(NamedTuple):
     """Integral part."""
 
-    integral: Annotated[float, Signal("A", "integral part of the speed PI", 5.0)]
+    integral: Annotated[float, Signal("A", "integral term of the speed PI", 5.0)]
 
 
 class ForceOutput(NamedTuple):

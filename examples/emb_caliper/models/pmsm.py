@@ -8,20 +8,28 @@ from typing import Any, ClassVar, Self
 
 from bywire.authoring import Bounds, Integral, Part, Role, Shown, Wire
 from bywire.core import ops
-from bywire.plant import angle_sensor, battery_supply, end_stop, inverter, pmsm
+from bywire.plant import (
+    angle_sensor,
+    battery_supply,
+    end_stop,
+    floating_caliper,
+    inverter,
+    pad_hysteresis,
+    pmsm,
+)
 from emb_caliper import ecu, ecu_pmsm
 from emb_caliper.elements import (
     ball_screw,
-    floating_caliper,
+    load_cell,
     load_friction,
     planetary_gear,
     rotor,
 )
-from emb_caliper.mechanics import CaliperBrake, clamp_force
+from emb_caliper.mechanics import CaliperBrake
 from emb_caliper.parameters import SynchronousBrakeParameters as Par
 
 
-class EmbCaliperPmsm(CaliperBrake[Par, ecu_pmsm.Memory]):
+class EmbCaliperPmsm(CaliperBrake[Par, Any]):
     """The brake with a synchronous motor."""
 
     name: ClassVar[str] = "emb-caliper-pmsm"
@@ -43,6 +51,8 @@ class EmbCaliperPmsm(CaliperBrake[Par, ecu_pmsm.Memory]):
     pads = Part(
         floating_caliper, par="caliper", output=("F_cl",), work="W_caliper", loss="E_caliper"
     )
+    hysteresis = Part(pad_hysteresis, loss="E_hysteresis")
+    force = Part(load_cell)
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
     t_stuck = Integral("s", "time stuck", role=Role("standstill"))
 
@@ -50,6 +60,7 @@ class EmbCaliperPmsm(CaliperBrake[Par, ecu_pmsm.Memory]):
     v_d = Wire("V", "d-axis voltage", 10.0)
     v_q = Wire("V", "q-axis voltage", 10.0)
     torque = Wire("N*m", "motor torque", 1.0)
+    F_pads = Wire("N", "clamp force", 1e4)
     i = Shown("A", "motor current, an amplitude with the torque's sign", 10.0)
     T_fr = Shown("N*m", "friction torque", 0.1)
     F_stop = Shown("N", "end stop load on the piston", 1e3)
@@ -60,6 +71,17 @@ class EmbCaliperPmsm(CaliperBrake[Par, ecu_pmsm.Memory]):
         "F_cl",
         "F_ref",
         "F_meas",
+        "F_used",
+        "F_hat",
+        "F_curve",
+        "F_balance",
+        "balance_valid",
+        "on_estimate",
+        "theta_0_hat",
+        "s_hat",
+        "C_hat",
+        "G_hat",
+        "strokes",
         "x",
         "theta",
         "omega",
@@ -89,6 +111,7 @@ class EmbCaliperPmsm(CaliperBrake[Par, ecu_pmsm.Memory]):
         "E_viscous",
         "E_friction",
         "E_caliper",
+        "E_hysteresis",
         "E_stop",
         "E_stored",
         "t_stuck",
@@ -102,7 +125,6 @@ class EmbCaliperPmsm(CaliperBrake[Par, ecu_pmsm.Memory]):
         """
         i = w.motor.x
         theta_e = w.motor.par.p * w.rotor.xe.theta
-        duty_d, duty_q = inverter.rotated(w.m.duty_alpha, w.m.duty_beta, theta_e)
         if w.par.drive == "voltage":
             w.i_dc = 0.0 * i.i_q
             w.v_d, w.v_q = 0.0 * i.i_d, w.m.v_source
@@ -110,7 +132,9 @@ class EmbCaliperPmsm(CaliperBrake[Par, ecu_pmsm.Memory]):
                 0.0 * w.v_d, 0.0 * w.v_q, 0.0 * i.i_d, 0.0 * i.i_q, theta_e, w.par.supply.V_bat
             )
         else:
-            w.i_dc = 1.5 * (duty_d * i.i_d + duty_q * i.i_q)
+            w.i_dc = inverter.bus_current(
+                w.m.duty_alpha, w.m.duty_beta, i.i_d, i.i_q, theta_e, w.inverter.par
+            )
             bus = battery_supply.output(battery_supply.Input(w.i_dc), w.supply.par).v_bus
             w.inverter.u = inverter.Input(
                 bus * w.m.duty_alpha, bus * w.m.duty_beta, i.i_d, i.i_q, theta_e, bus
@@ -153,11 +177,12 @@ class EmbCaliperPmsm(CaliperBrake[Par, ecu_pmsm.Memory]):
 def _reading(law: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
     """Return a controller's tick with the sensor readings."""
 
-    def tick(x: Any, m: ecu_pmsm.Memory, u: ecu.Stimulus, par: Par) -> ecu_pmsm.Memory:
-        i_alpha, i_beta = inverter.rotated(x.i_d, x.i_q, -par.motor.p * x.theta)
-        i_dc = 1.5 * (m.duty_alpha * i_alpha + m.duty_beta * i_beta)
+    def tick(x: Any, m: Any, u: ecu.Stimulus, par: Par) -> Any:
+        theta_e = par.motor.p * x.theta
+        i_alpha, i_beta = inverter.rotated(x.i_d, x.i_q, -theta_e)
+        i_dc = inverter.bus_current(m.duty_alpha, m.duty_beta, x.i_d, x.i_q, theta_e, par.inverter)
         readings = ecu_pmsm.Readings(
-            clamp_force(x, par),
+            x.F_cell,
             angle_sensor.reading(x.theta, par.encoder),
             x.omega,
             i_alpha,

@@ -20,7 +20,7 @@ from bywire.authoring import (
     parameters,
     style,
 )
-from emb_caliper.elements import floating_caliper
+from bywire.plant import floating_caliper
 from emb_caliper.experiments.power_off import held_force
 from emb_caliper.paper import facts
 from emb_caliper.sets.emb42v import SOURCE as CITATION
@@ -171,6 +171,6 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
 
 SOURCE = Source(
     name="line2008",
-    summary="electro-mechanical caliper under cascaded PI control, statements in the abstract",
+    summary="electro-mechanical caliper under cascaded PI control, claims in the abstract",
     reproduce=reproduce,
 )

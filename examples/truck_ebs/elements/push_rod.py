@@ -1,4 +1,4 @@
-"""Push rod of the chamber, with everything that moves with it; the lever is rigid."""
+"""Push rod of the chamber, with everything that moves with it."""
 
 from __future__ import annotations
 
@@ -6,24 +6,19 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
-from bywire.authoring import Energy, Force, Mass, ParameterSet, Power, Role, Signal, Unit
+from bywire.authoring import Energy, Mass, ParameterSet, Power, Role, Signal, Unit
 
-LeverRatio = Annotated[float, Unit("1", 15.0), Field(ge=1, le=50, allow_inf_nan=False)]
 Damping = Annotated[float, Unit("N*s/m", 100.0), Field(ge=0, allow_inf_nan=False)]
 Loss = Annotated[float, Signal("W", "damping loss of the rod", role=Role("sink", "rod damping"))]
 
 
 class Parameters(ParameterSet):
-    """One mass at the rod, and the lever between rod and pads."""
+    """One mass at the rod; its dry friction belongs to the lever."""
 
     m: Mass
     """mass of rod, diaphragm, lever and pads, at the rod"""
     d: Damping
     """viscous damping of the rod"""
-    F_fr: Force
-    """dry friction of rod and lever, at the rod"""
-    i: LeverRatio
-    """travel of the rod per travel of the pads"""
 
 
 class State(NamedTuple):
@@ -51,7 +46,7 @@ class Input(NamedTuple):
     """Forces of chamber and stops, and dry friction."""
 
     force: Annotated[float, Signal("N", "force of the chamber", 5e3)]
-    load: Annotated[float, Signal("N", "load of pads and stop", 5e3)]
+    load: Annotated[float, Signal("N", "load of lever and stop", 5e3)]
     friction: Annotated[float, Signal("N", "friction force, positive along the motion", 50.0)]
 
 

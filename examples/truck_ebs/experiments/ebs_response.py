@@ -1,4 +1,4 @@
-"""Response time of the brake: a full demand within 0.2 s."""
+"""Response time of the brake at standstill: a full demand within 0.2 s."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ from bywire.authoring import (
     TimeConstant,
     Unit,
 )
-from truck_ebs.model import TruckEbs, rolling
 from truck_ebs.parameters import TruckParameters
+from truck_ebs.rigs.brake_rig import BrakeRig
 
 Array = NDArray[np.float64]
-RidingSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
 Demand = Annotated[float, Unit("Pa", 4e5), Field(gt=0, allow_inf_nan=False)]
 FIGURES = Figures(
     undefined="the pressure does not reach this level within the recording",
@@ -37,17 +36,20 @@ FIGURES = Figures(
 )
 
 
-class Options(ParameterSet):
-    """The demand. Regulations test at standstill, but the pressure does not depend on the speed."""
+class DemandOptions(ParameterSet):
+    """A demand from time zero."""
 
-    v_0: RidingSpeed
-    """speed at the beginning"""
     p_brake: Demand
     """demanded pressure"""
-    t_pedal: TimeConstant
-    """time in which the pedal is pressed"""
     duration: Duration
     """recording time"""
+
+
+class Options(DemandOptions):
+    """The demand."""
+
+    t_pedal: TimeConstant
+    """time in which the pedal is pressed"""
 
 
 def demanded(p: float, t_pedal: float) -> Callable[[Array], Mapping[str, Array]]:
@@ -60,19 +62,17 @@ def demanded(p: float, t_pedal: float) -> Callable[[Array], Mapping[str, Array]]
     return demand
 
 
+def on_rig(
+    par: TruckParameters, demand: Callable[[Array], Mapping[str, Array]], duration: float
+) -> tuple[Case, ...]:
+    """Return the single run of a brake on the rig, from its released state."""
+    rig = BrakeRig()
+    return (Case("run", rig, par, *rig.rest(par), demand, duration, start=rig.rest),)
+
+
 def cases(par: TruckParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the single run."""
-    return (
-        Case(
-            "run",
-            TruckEbs(),
-            par,
-            *rolling(par, options.v_0),
-            demanded(options.p_brake, options.t_pedal),
-            options.duration,
-            start=lambda par: rolling(par, options.v_0),
-        ),
-    )
+    return on_rig(par, demanded(options.p_brake, options.t_pedal), options.duration)
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
@@ -102,7 +102,7 @@ EXPERIMENT = Experiment(
     assembly="truck-ebs",
     summary="{p_brake:bar} within {t_pedal:s}: time to 10 % and to 75 %",
     options=Options,
-    defaults=Options(v_0=80.0 / 3.6, p_brake=7e5, t_pedal=0.2, duration=1.5),
+    defaults=Options(p_brake=7e5, t_pedal=0.2, duration=1.5),
     cases=cases,
     judge=judge,
     kpis=FIGURES.units,

@@ -17,7 +17,7 @@ from bywire.core.typing import Array, Complex, Progress
 
 _PATIENCE = 12  # maximum number of windows for loops with friction, which may never repeat exactly
 GAIN, PHASE = 0.01, 0.1
-"""maximum difference of gain [dB] and phase [degree] that counts as agreement"""
+"""maximum difference of gain [dB] and phase [degree] that is treated as agreement"""
 NOTHING, LIMITS, EVERYTHING = "", "limits", "all"
 """active nonlinearities: none, at a small amplitude; only limits of currents, voltages and rates,
 at a large amplitude; all"""
@@ -70,8 +70,8 @@ class Agreement:
         """Cause with the largest effect on the response at each frequency, shape (n,).
 
         Limits count by their own effect, other causes by their additional effect. Causes that make
-        the output stick or prevent settling count as largest; several are joined. The entry is
-        empty if no effect exceeds the tolerance of agreement.
+        the output stick or prevent settling are treated as largest; several are joined. The entry
+        is empty if no effect exceeds the tolerance of agreement.
         """
         moves = {LIMITS: (self.gain[LIMITS], self.phase[LIMITS])}
         singles = [c for c in self.gain if c not in (NOTHING, LIMITS, EVERYTHING)]

@@ -22,7 +22,7 @@ Response = Callable[[Array], Complex]
 DROP = math.sqrt(0.5)
 """fraction of its initial magnitude to which a response has fallen at its bandwidth: -3 dB"""
 NEARLY_ZERO = 1.0
-"""phase [degree] at the lower end that still counts as 0: a loop of finite gain"""
+"""phase [degree] at the lower end that is still treated as 0: a loop of finite gain"""
 _BRACKETS = 4000  # points of the grid that brackets crossings of a function of frequency
 
 
@@ -139,7 +139,7 @@ def fall(
     Parameters
     ----------
     gain
-        Magnitudes, shape (n,); NaN, where the output sticks, counts as 0.
+        Magnitudes, shape (n,); NaN, where the output sticks, is treated as 0.
     frequencies
         Ascending [Hz], shape (n,).
     start

@@ -34,7 +34,7 @@ _REST = 1e-6  # Hz: frequency that represents rest
 _BAND = 0.02  # of the step: half the settling band
 _MOST = 2**15  # samples of a step response: 33 s for a loop of 1 kHz
 _NOISE_POINTS = 1000  # frequencies, evenly spaced
-_LEFT_AFTER = 10.0  # periods of the bandwidth after which an error counts as steady
+_LEFT_AFTER = 10.0  # periods of the bandwidth after which an error is treated as steady
 _SETTLED = 1e-4  # maximum remaining fraction of the slowest mode at the end of a step response
 
 
@@ -145,18 +145,22 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
             is_less_better=True,
         ),
         LoopFigure(
-            "overshoot", "%", "overshoot of the unit step at the sample times", is_less_better=True
+            "overshoot",
+            "%",
+            "overshoot of the unit step response at the sample times",
+            is_less_better=True,
         ),
         LoopFigure(
             "settling_time",
             "s",
-            "settling time of the unit step, to 2 % of its height",
+            "settling time of the unit step response, to within 2 % of the step height",
             is_less_better=True,
         ),
         LoopFigure(
             "steady_state_error",
             "%",
-            "remaining error of a unit step after ten periods of the bandwidth",
+            "remaining error of the unit step response after ten periods of the bandwidth "
+            "frequency",
             is_less_better=True,
         ),
     )

@@ -244,7 +244,7 @@ class Family:
 
     @property
     def worst(self) -> int:
-        """Index of the smallest disk margin; an unstable or missing loop counts as the worst."""
+        """Index of the smallest disk margin; an unstable or missing loop is the worst."""
         disks = [c.margins.disk if c.margins.is_sound else -math.inf for c in self.curves]
         return int(np.argmin(disks))
 

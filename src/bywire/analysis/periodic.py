@@ -23,6 +23,7 @@ from bywire.core.errors import CompilerError, ParameterError, SolverError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex
+from bywire.core.units import shown
 from bywire.simulation.advance import require_finite, require_unchanged
 from bywire.simulation.compiler import Compiler, find_compiler
 from bywire.simulation.engine import built_once, prepare
@@ -295,8 +296,9 @@ def period_of(frequencies: Sequence[float], intervals: Sequence[float], step: fl
         count = 1.0 / (f * step)
         if abs(count - round(count)) > 1e-6 * count:
             raise ParameterError(
-                f"a period of 1/({f:g} Hz) = {1e3 / f:.6g} ms is not a multiple of the step of "
-                f"{step * 1e6:g} us. Use a frequency that divides the sample rate",
+                f"a period of 1/({f:g} Hz) = {shown(1.0 / f, 's')} is not a multiple of the step "
+                "of "
+                f"{shown(step, 's')}. Use a frequency that divides the sample rate",
                 name="frequency",
                 value=f"{f:g} Hz",
             )
@@ -593,8 +595,8 @@ def dithered_loop(
     Parameters
     ----------
     loop, par, value
-        The loop and its operating point. Converters and encoders count as ideal, because rounded
-        values have no derivative.
+        The loop and its operating point. Converters and encoders are treated as ideal, because
+        rounded values have no derivative.
     step
         As in `periodic_model`.
 

@@ -456,7 +456,8 @@ def reduce(
             return Reduced(rung.model, error, kept, rung.hankel, rung.bound)
         best = min(best, error.relative)
     raise ParameterError(
-        f"{full.name}: no order has an error below {100.0 * tolerance:g} % up to {high:g} Hz (the "
+        f"{full.name}: no reduced model has an error below {100.0 * tolerance:g} % up to "
+        f"{high:g} Hz (the "
         f"minimum error is {100.0 * best:.2g} %). Increase the tolerance, or use a lower band",
         name="tolerance",
         value=f"{100.0 * tolerance:g} %",

@@ -260,7 +260,7 @@ class Compared:
 
     @property
     def differs(self) -> bool:
-        """Whether the runs have different values. Undefined values count as equal."""
+        """Whether the runs have different values. Undefined values are treated as equal."""
         first, *others = (_comparable(value) for value in self.values)
         return any(value != first for value in others)
 

@@ -155,7 +155,7 @@ class Probability:
         if self.judged.unstable:
             lines.append(
                 f"{self.judged.unstable} of these other models are unstable or do not exist. They "
-                "count as failing every requirement"
+                "are treated as failing every requirement"
             )
         if self.drawn.lacking:
             lines.append(f"for {self.drawn.lacking} more draws, no model exists")
@@ -236,7 +236,8 @@ def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
     designed = tuple(each for each in models[:count] if each is not None)
     if not designed:
         raise ParameterError(
-            f"{file}: no model exists for any of its {count} draws. Narrow its [vary] section",
+            f"{file}: none of its {count} draws results in a valid model. Narrow its [vary] "
+            "section",
             name=str(file),
             value=str(count),
         )

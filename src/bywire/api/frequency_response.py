@@ -100,8 +100,8 @@ def response_warnings(
             )
     if response.attrs.get("unestimated"):
         texts.append(
-            "the response's numerical error is unknown, because bywire cannot measure it "
-            f"with half the step ({response.attrs['unestimated']})"
+            "the response's numerical error is unknown, because bywire cannot measure the "
+            f"response with half the step ({response.attrs['unestimated']})"
         )
     if response["unsettled_substeps"].values.any():
         texts.append("some substeps hit the contact iteration's limit. Use a smaller step")

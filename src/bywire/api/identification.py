@@ -24,7 +24,7 @@ from bywire.core.errors import FileError, InputError, ParameterError, unknown_na
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.typing import Progress, silent
 from bywire.core.values import parsed
-from bywire.data.named_columns import NamedColumns
+from bywire.data.named_columns import NamedColumns, reject_swapped
 from bywire.identification.estimate import Estimate, as_object
 from bywire.identification.measured import Measured, measured, name_of, require_signals
 from bywire.identification.method import Effort, Identified
@@ -181,6 +181,8 @@ def _require_columns_alone(method: Method, question: Question) -> None:
             name=option(beyond[0] if beyond else "outputs"),
         )
     signals = {**method.signals, **method.optional}
+    reject_swapped("outputs", question.columns, signals)
+    reject_swapped("inputs", question.inputs, signals)
     for name in (*question.inputs, *question.columns):
         if name not in signals:
             raise unknown_of_few(f"signal of {method.name}", name, signals)
@@ -943,7 +945,7 @@ class Identification(Answer):
         reason = (
             "no estimate is usable"
             if asked
-            else f"{method.name} does not identify parameters of an assembly. Its figures are in "
+            else f"{method.name} does not identify parameters of an assembly. Its results are in "
             "estimate.json"
         )
         return [f"no parameters.toml: {reason}"]

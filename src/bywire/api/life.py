@@ -153,7 +153,7 @@ class LifeResult(Answer):
                 "interval",
                 made.error,
                 "1",
-                f"Half width of its {100 * CONFIDENCE:g} % interval, from a sample of "
+                f"Half-width of its {100 * CONFIDENCE:g} % interval, from a sample of "
                 f"{made.plan.count} stop{'s' * (made.plan.count > 1)}.",
             ),
             KpiRow("runs", float(runs), "1", "Simulated stops."),

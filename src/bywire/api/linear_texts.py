@@ -191,7 +191,9 @@ def reduced_object(reduced: Reduced) -> dict[str, Any]:
 def corner_notes(corners: Iterable[Sequence[str]]) -> list[str]:
     """Return one note on each side of a kink that linear models use."""
     texts = dict.fromkeys(text for each in corners for text in each)
-    return [f"the operating point lies on a kink, and the linear model is {each}" for each in texts]
+    return [
+        f"the operating point lies on a kink. The linear model is valid {each}" for each in texts
+    ]
 
 
 def reduced_line(reduced: Reduced) -> str:

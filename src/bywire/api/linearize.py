@@ -311,8 +311,9 @@ def _friction(friction: str, speed: str) -> tuple[Friction, float]:
     omega = number(speed, "rad/s", option("speed")) if speed else 0.0
     if kind == "sliding" and omega == 0.0:
         raise ParameterError(
-            f"{option('friction', 'sliding')} needs a motor speed, because friction at rest has no "
-            f"slope. Add {option('speed')}, for example '5 rad/s', positive toward clamping",
+            f"{option('friction', 'sliding')} needs a motor speed, because friction at rest has "
+            f"no derivative. Add {option('speed')}, for example '5 rad/s', positive toward "
+            "clamping",
             name=option("speed"),
         )
     if kind != "sliding" and omega != 0.0:

@@ -112,10 +112,10 @@ _SAID = (
 
 _NAMED = 3  # requirements that are not met, in the banner
 _SCATTERED = (
-    'Errors marked "up to" belong to figures that do not converge. Between runs with twice, '
+    'Errors marked "up to" belong to key figures that do not converge. Between runs with twice, '
     "once and half the step size, their differences do not shrink as a second-order scheme "
-    "requires, so their errors are unknown. The value is a 95 % bound from the figure's scatter "
-    "over all steps."
+    "requires, so their errors are unknown. The value is a 95 % bound from the scatter of the "
+    "key figure over all steps."
 )
 
 

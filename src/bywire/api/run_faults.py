@@ -143,12 +143,12 @@ class FaultCampaign(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Harm done by the reaction, and warnings of the healthy run and the solver."""
+        """Harm done by the reaction, and warnings of the fault-free run and the solver."""
         healthy = [] if self.nominal is None else self.nominal.warnings
         return [
             *self.findings.harm_of_reaction(),
             *self.findings.plan.bench.outdated,
-            *(f"healthy run: {text}" for text in healthy),
+            *(f"fault-free run: {text}" for text in healthy),
             *self.findings.doubts,
         ]
 
@@ -159,18 +159,19 @@ class FaultCampaign(Answer):
         alarms, cases = findings.false_alarms, findings.coverage_of_cases
         weight = "failure rates of [rates]" if findings.is_weighted else "unweighted"
         notes = [
-            f"thresholds were tuned on {plan.tuning} healthy runs. Alarms and faults were "
-            f"evaluated on {plan.healthy - plan.tuning} other healthy runs, of which "
-            f"{alarms.count} raise an "
-            f"alarm ({100 * alarms.low:.2g} to {100 * alarms.high:.2g} %)",
+            f"thresholds were tuned on {plan.tuning} fault-free runs. Alarms and faults were "
+            f"evaluated on {plan.healthy - plan.tuning} other fault-free runs, of which "
+            f"{alarms.count} raise an alarm (95 % confidence interval: {100 * alarms.low:.2g} to "
+            f"{100 * alarms.high:.2g} %)",
             "coverage is the fraction of dangerous runs in which a monitor detects the fault "
             f"within its fault-tolerant time ({weight}). Monitors detect it in time in "
-            f"{cases.count} of {cases.cases} runs ({100 * cases.low:.3g} to "
-            f"{100 * cases.high:.3g} %)",
+            f"{cases.count} of {cases.cases} runs (95 % confidence interval: "
+            f"{100 * cases.low:.3g} to {100 * cases.high:.3g} %)",
         ]
         if not plan.varied:
             notes.append(
-                "nothing varies, so thresholds come from a single healthy run. Add a [vary] section"
+                "nothing varies, so thresholds come from a single fault-free run. Add a [vary] "
+                "section"
             )
         if plan.reaction is not None:
             notes.append(
@@ -372,8 +373,8 @@ class FaultCampaign(Answer):
             ),
             FigureBlock(
                 curves,
-                "Median detection delay in dangerous runs versus the number of healthy runs with "
-                "an alarm, for multiples of each threshold. Rings mark the thresholds in use.",
+                "Median detection delay in dangerous runs versus the number of fault-free runs "
+                "with an alarm, for multiples of each threshold. Rings mark the thresholds in use.",
                 "alarm-curves",
             ),
         ]

@@ -240,7 +240,7 @@ class BenchRange(Answer):
         captions = {
             "curves": "Curves for all values. The color scale shows the values.",
             "kpis": "Key figures versus the value, with their numerical error where it is "
-            "visible. Dotted lines show the limit. Crosses miss it. Figures that are constant "
+            "visible. Dotted lines show the limit. Crosses miss it. Key figures that are constant "
             "or undefined are "
             "omitted.",
         }

@@ -41,7 +41,7 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
     known = np.isfinite(findings.figure(name))
     cases = drawn_cases(met, POINTS, known=known)
     lacking = cases.lacking.size
-    every = "all that have it" if lacking else "all"
+    every = "all cases in which it is defined" if lacking else "all"
     crosses = (
         f"{every} meet the limit"
         if not cases.all_missed
@@ -52,7 +52,8 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
     sentences = [
         f"{name.replace('_', ' ')} versus its main influences. {crosses.capitalize()}.",
         cases.caption("meet the limit", "miss it"),
-        f"Triangles at the top mark cases without the figure ({lacking}), which miss the limit."
+        f"Triangles at the top mark cases in which the key figure is not defined ({lacking}). "
+        "They miss the limit."
         if lacking
         else "",
         "Cases concentrate near failures, so the fraction of cases is not a probability."
@@ -80,7 +81,7 @@ def parallel(findings: Findings) -> Block:
     )
     drawn = _required(findings)
     if not all(np.isfinite(findings.figure(name)).all() for name in drawn):
-        text += " The line of a case without the figure goes to 'none'."
+        text += " The line of a case in which the key figure is not defined goes to 'none'."
     if absent := [j.demand.figure for j in findings.judgments if j.demand.figure not in drawn]:
         text += f" No case has {', '.join(absent)}."
     return FigureBlock(partial(_parallel, findings, cases), text, "parallel")
@@ -227,7 +228,7 @@ def _on_gray(findings: Findings) -> str:
 def _on_edge(effects: Mapping[str, Sequence[Effect]]) -> str:
     if not any(effect.lacking for each in effects.values() for effect in each):
         return ""
-    return " A triangle means that the figure is not defined at some levels."
+    return " A triangle means that the key figure is not defined at some levels."
 
 
 def _has_choices(findings: Findings) -> bool:

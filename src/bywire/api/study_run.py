@@ -279,7 +279,7 @@ def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
     texts += of_the_bench if not texts else []
     if failed := findings.failures:
         texts.append(
-            f"{len(failed)} of {count} cases have no result. They count as failing every "
+            f"{len(failed)} of {count} cases have no result. They are treated as failing every "
             "requirement"
         )
     if findings.spreads:

@@ -369,13 +369,13 @@ def rare_notes(findings: Findings) -> list[str]:
     notes = []
     if design.kind == SUBSET and design.level != design.asked:
         notes.append(
-            f"{design.level} cases per level instead of {design.asked}, because cases come in "
-            "whole chunks"
+            f"{design.level} cases per level instead of {design.asked}, because the study "
+            "computes cases in whole chunks"
         )
     if unjudged := [str(each) for each in plan.demands if each not in plan.judged_demands]:
         notes.append(
-            f"no verdict without a required probability: {'; '.join(unjudged)}. Cases that search "
-            "for failures do not represent all cases"
+            f"no verdict without a required probability: {'; '.join(unjudged)}. Cases from a "
+            "failure search are not a random sample"
         )
     notes += [
         f"{each.demand.figure}: the probability of failure is below a thousandth of the limit, so "
@@ -386,7 +386,7 @@ def rare_notes(findings: Findings) -> list[str]:
     for each in findings.judgments if len(findings.cases) else ():
         if each.outcome == "undecided" and each.failure and each.failure.state == "done":
             more = (
-                "To narrow it, use more cases_per_level and another folder"
+                "To narrow the interval, increase cases_per_level and use another folder"
                 if design.kind == SUBSET
                 else "Extend the study"
             )
@@ -414,7 +414,7 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
             ". Extend the study" if outcome == "undecided" else ""
         )
     if failure.state == "level":
-        return "too many cases have the same figure to rank them. Use 'monte-carlo'"
+        return "too many cases have the same key figure to rank them. Use 'monte-carlo'"
     if failure.state == "no design point":
         return f"bywire found no design point, because {failure.why}. Use 'subset-simulation'"
     return ""

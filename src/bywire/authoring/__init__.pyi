@@ -5,6 +5,7 @@ from bywire.analysis.linear.linearize import linearize as linearize
 from bywire.analysis.linear.sampled_loops import closed_loop as closed_loop
 from bywire.analysis.loop import LOOPS as LOOPS
 from bywire.analysis.loop import Loop as Loop
+from bywire.analysis.loop import LoopSchedule as LoopSchedule
 from bywire.analysis.loop import Plant as Plant
 from bywire.analysis.loop import PlantPoint as PlantPoint
 from bywire.analysis.loop import Point as Point
@@ -32,8 +33,12 @@ from bywire.bench.stated import StatedFigure as StatedFigure
 from bywire.bench.stated import StatedLevel as StatedLevel
 from bywire.bench.stated import StatedRange as StatedRange
 from bywire.bench.stimulus import Stimulus as Stimulus
+from bywire.campaigns.residual import NEVER as NEVER
 from bywire.campaigns.residual import DeclaredCampaign as DeclaredCampaign
 from bywire.campaigns.residual import Residual as Residual
+from bywire.campaigns.residual import largest_of_the_last as largest_of_the_last
+from bywire.campaigns.residual import least_of_the_last as least_of_the_last
+from bywire.campaigns.residual import mean_of_the_last as mean_of_the_last
 from bywire.core import quantities as quantities
 from bywire.core import signals as signals
 from bywire.core import validity as validity
@@ -105,10 +110,12 @@ from bywire.core.signals import Power as Power
 from bywire.core.signals import Role as Role
 from bywire.core.signals import Signal as Signal
 from bywire.core.signals import Speed as Speed
+from bywire.core.signals import joined as joined
 from bywire.core.signals import zeros as zeros
 from bywire.core.typing import Array as Array
 from bywire.core.typing import Progress as Progress
 from bywire.identification.differentiation import differentiated as differentiated
+from bywire.identification.differentiation import low_passed as low_passed
 from bywire.identification.estimate import Estimate as Estimate
 from bywire.identification.least_squares import Problem as Problem
 from bywire.identification.least_squares import estimate as estimate

@@ -102,10 +102,10 @@ def refuse_share_of_temperature(name: str, text: str, symbol: str) -> None:
     if difference_unit(symbol) != symbol:
         raise ParameterError(
             f"{name} = {quoted(text)} is ambiguous because degC and K have different zero points. "
-            "Specify a temperature, or a width in K",
+            "Specify a temperature, or a difference in K",
             name=name,
             value=text,
-            valid="a temperature, or a width in K",
+            valid="a temperature, or a difference in K",
         )
 
 

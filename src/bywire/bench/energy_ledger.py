@@ -7,8 +7,9 @@ and ``E_stored`` and every other ``E_...`` are sinks.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any
 
@@ -89,7 +90,7 @@ class Delivery:
     energy
         Maximum returned energy in J, >= 0. For the rows of several runs, an array of shape (runs,).
     turnover
-        Energy turnover of the balance in J.
+        Energy transferred in the balance in J.
     """
 
     name: str
@@ -218,7 +219,16 @@ def _ledger(recording: xr.Dataset, book: str, is_split: bool = True) -> Ledger:
                 Posting(f"{name}_{kind}", f"{role.label}, {kind}", split[f"{name}_{kind}"])
                 for kind in kinds
             ] or [Posting(name, role.label, changes[name])]
-    return Ledger(tuple(given), tuple(taken))
+    return Ledger(_told_apart(given), _told_apart(taken))
+
+
+def _told_apart(postings: Sequence[Posting]) -> tuple[Posting, ...]:
+    """Return postings whose labels differ; equal labels are followed by the variable's name."""
+    count = Counter(each.label for each in postings)
+    return tuple(
+        replace(each, label=f"{each.label} ({each.name})") if count[each.label] > 1 else each
+        for each in postings
+    )
 
 
 def _roles(recording: xr.Dataset, names: Collection[str]) -> dict[str, Role]:
@@ -313,9 +323,9 @@ def energy_doubts_of_cases(
         is_wrong = np.broadcast_to(_is_delivered(each), cases)
         for k in np.flatnonzero(is_wrong).tolist():
             doubts[k].append(
-                f"the loss {each.label!r}{where} ({each.name}) delivers {energies[k]:.3g} J of a "
-                f"turnover of {totals[k]:.3g} J, which is impossible. Do not trust this run. Use "
-                "a smaller step, and check for an extreme parameter"
+                f"the loss {each.label!r}{where} ({each.name}) delivers {energies[k]:.3g} J of "
+                f"{totals[k]:.3g} J transferred, which is impossible. Do not trust this run. Use a "
+                "smaller step, and check for an extreme parameter"
             )
     if _are_surely_closed(recording):
         return doubts
@@ -324,9 +334,9 @@ def energy_doubts_of_cases(
     for k, (left, total) in enumerate(zip(error.tolist(), turned.tolist(), strict=True)):
         if abs(left) > _OPEN * total + _NOTHING:
             doubts[k].append(
-                f"the energy balance is off by {abs(left):.3g} J of a turnover of "
-                f"{total:.3g} J. Do not trust this run. Use a smaller step, and check for an "
-                "extreme parameter"
+                f"the energy balance has an error of {abs(left):.3g} J of "
+                f"{total:.3g} J transferred. Do not trust this run. Use a smaller step, and check "
+                "for an extreme parameter"
             )
     return doubts
 

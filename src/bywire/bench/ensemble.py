@@ -36,7 +36,6 @@ from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.parameters import Leaf, ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
-from bywire.simulation.engine import CUDA
 from bywire.simulation.ensemble import Ensemble, RunGroup, Variations, fit_lanes, simulate_group
 from bywire.simulation.run import Run, Trajectory, simulate
 
@@ -430,7 +429,7 @@ def rounds(
         outputs = runs[0].model.Output._fields if wanted is None else wanted.signals
         ends = () if wanted is None else wanted.ends
         kinds = [benches[k].engine if engine == "auto" else engine for k in places]
-        if ends and (kinds[0] == CUDA or any(run.changes for run in runs)):
+        if ends and any(run.changes for run in runs):
             both, ends = {*outputs, *ends}, ()
             outputs = tuple(name for name in runs[0].model.Output._fields if name in both)
         check_memory(runs[0], len(runs) * len(outputs))

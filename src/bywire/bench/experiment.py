@@ -21,10 +21,10 @@ from bywire.core.arguments import checked
 from bywire.core.errors import ModelError, StepError, not_valid, quoted
 from bywire.core.machine import machine_memory as _memory
 from bywire.core.model import Model
-from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.quantities import BY_SIZE, display_unit
+from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
+from bywire.core.quantities import BY_SIZE, Unit, display_unit
 from bywire.core.registry import Kind, instances
-from bywire.core.units import convert, unit_text
+from bywire.core.units import convert, shown, unit_text
 from bywire.simulation.advance import Change
 from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
@@ -457,21 +457,25 @@ _GIGA = 1e9
 
 def checked_step(value: Any) -> float:
     """Return a substep [s], or raise a StepError."""
-    step = units.parse(value, "s", "simulation.step")
-    if step < SHORTEST_STEP:
-        limit = f">= {SHORTEST_STEP:g} s"
-        raise not_valid("simulation.step", f"{step:g} s", limit, "usually 20 us", StepError)
-    return step
+    return _checked_time("simulation.step", value, SHORTEST_STEP, False, "usually 20 us")
 
 
 def checked_interval(value: Any) -> float | None:
     """Return a recording interval [s], None for the experiment's own, or raise a StepError."""
     if value is None:
         return None
-    interval = units.parse(value, "s", "simulation.record")
-    if interval <= 0:
-        raise not_valid("simulation.record", f"{interval:g} s", "> 0 s", "usually 1 ms", StepError)
-    return interval
+    return _checked_time("simulation.record", value, 0.0, True, "usually 1 ms")
+
+
+def _checked_time(name: str, value: Any, low: float, low_open: bool, advice: str) -> float:
+    """Return a time [s] that remembers its text, which errors of the schedule use."""
+    text = value if isinstance(value, str) else getattr(value, "text", "")
+    time = units.Written(units.parse(value, "s", name), text)
+    leaf = Leaf(name, Unit("s"), low, math.inf, low_open, high_open=True)
+    if leaf.admits(time):
+        return time
+    written, valid = leaf.outside_text(time, text)
+    raise not_valid(name, written, valid, advice, StepError)
 
 
 def check_seed(value: Any) -> None:
@@ -494,11 +498,11 @@ def check_extent(case: Case, run: Run) -> None:
     """
     if not run.record <= case.duration:
         raise StepError(
-            f"a recording of {case.duration:g} s cannot have rows every {run.record:g} s. "
-            "Lengthen the run, or record more often (simulation.record)",
+            f"a recording of {shown(case.duration, 's')} cannot have rows every "
+            f"{shown(run.record, 's')}. Lengthen the run, or record more often (simulation.record)",
             name="simulation.record",
-            value=f"{run.record:g} s",
-            valid=f"<= {case.duration:g} s",
+            value=shown(run.record, "s"),
+            valid=f"<= {shown(case.duration, 's')}",
         )
     check_memory(run, len(run.model.Output._fields))
 

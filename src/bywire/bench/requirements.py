@@ -129,7 +129,7 @@ def judge(limits: Iterable[Limit], kpis: Iterable[Kpi]) -> tuple[Verdict, ...]:
     """Compare KPIs with their limits.
 
     A verdict is undecided if the KPI is closer to the limit than its error, or if the recording
-    does not determine the KPI. A KPI without an error estimate counts as exact.
+    does not determine the KPI. A KPI without an error estimate is treated as exact.
     """
     by_name = {kpi.name: kpi for kpi in kpis}
     return tuple(verdict_of(limit, by_name[limit.figure]) for limit in limits)

@@ -56,7 +56,8 @@ def unestimated(failures: Mapping[float, Exception]) -> str:
     """Return the warning that the bench runs with no other step, and the reason for each ratio."""
     reasons = ", ".join(f"{_share(factor)}: {error}" for factor, error in failures.items())
     return (
-        "the numerical error of the figures is unknown because the bench runs neither with half "
+        "the numerical error of the key figures is unknown because the bench runs neither with "
+        "half "
         f"the step nor with twice the step ({reasons})"
     )
 
@@ -81,8 +82,8 @@ def _share(factor: float) -> str:
 def are_distinct(values: Sequence[float], errors: Sequence[float]) -> bool:
     """Return whether any two values differ by more than their errors.
 
-    Errors that were not estimated (NaN) count as zero. An undefined value (NaN) differs from a
-    defined one, unless an error is infinite.
+    Errors that were not estimated (NaN) are treated as zero. An undefined value (NaN) differs from
+    a defined one, unless an error is infinite.
 
     Examples
     --------

@@ -65,15 +65,16 @@ def require_small(plan: CampaignPlan) -> None:
     if runs * rows * signals > _MOST:
         raise ParameterError(
             f"{runs} runs with {rows:.3g} rows of {signals} signals exceed the limit of "
-            f"{_MOST:.3g} numbers. Use fewer healthy runs or onsets, a shorter maneuver, or a "
-            "longer simulation.record",
+            f"{_MOST:.3g} numbers. Use fewer fault-free runs (healthy) or onsets, a shorter "
+            "maneuver, "
+            "or a longer simulation.record",
             name="simulation.record",
             valid=f"{_MOST:.3g}",
         )
 
 
 def healthy_traces(plan: CampaignPlan) -> Traces:
-    """Return the signals of all healthy runs."""
+    """Return the signals of all fault-free runs."""
     cases = [_case(plan, sample, (), False) for sample in range(plan.healthy)]
     return _traces(plan, cases, list(range(plan.healthy)))
 
@@ -157,12 +158,12 @@ Outcome = dict[str, Any]
 
 @dataclass(frozen=True)
 class Healthy:
-    """Results of healthy runs: signals, thresholds and false alarms.
+    """Results of fault-free runs: signals, thresholds and false alarms.
 
     Parameters
     ----------
     traces
-        Signals of all healthy runs.
+        Signals of all fault-free runs.
     thresholds
         Threshold of every residual, tuned on the first half.
     alarms
@@ -179,7 +180,7 @@ class Healthy:
 
 
 def judge_healthy(plan: CampaignPlan, traces: Traces) -> Healthy:
-    """Tune thresholds on one half of the healthy runs, and count false alarms in the other."""
+    """Tune thresholds on one half of the fault-free runs, and count false alarms in the other."""
     thresholds: dict[str, float] = {}
     alarms: dict[str, list[int]] = {}
     alarmed = np.zeros(plan.healthy - plan.tuning, dtype=bool)
@@ -242,7 +243,7 @@ def _reached(
 def _extremes(
     plan: CampaignPlan, traces: Traces, beside: Traces, onsets: Array
 ) -> dict[str, list[Any]]:
-    """Return each judged signal's deviation from its healthy run: minimum, maximum, at the end."""
+    """Return each judged signal's deviation from its fault-free run: extremes and end value."""
     later = traces.time >= onsets[:, None] - 1e-9
     extremes = {}
     for name in dict.fromkeys(c.signal for c in plan.criteria):

@@ -58,8 +58,8 @@ class Criterion:
     signal
         Recorded signal that is judged.
     sense, level
-        Forbidden side of a level [SI], of a distance from the healthy run, or of a fraction of it.
-    lasting
+        Forbidden side of a level [SI], of a distance from the fault-free run, or of a fraction of
+        it. lasting
         Uninterrupted duration [s] of a violation.
     severity
         Severity class from the user, for example ``"S3"``.
@@ -213,9 +213,9 @@ class CampaignPlan:
         Quantities that scatter from run to run; pairs of names -> correlation of their normal
         scores.
     healthy
-        Number of healthy runs: one half tunes thresholds, the other half judges them.
+        Number of fault-free runs: one half tunes thresholds, the other half judges them.
     false_alarms
-        Fraction of healthy runs in which a residual may exceed its threshold.
+        Fraction of fault-free runs in which a residual may exceed its threshold.
     seed
         Seed of scatter and noise.
     rates
@@ -240,7 +240,7 @@ class CampaignPlan:
 
     @property
     def tuning(self) -> int:
-        """Number of healthy runs that tune thresholds: the first ones."""
+        """Number of fault-free runs that tune thresholds: the first ones."""
         return self.healthy // 2
 
     @property
@@ -253,12 +253,12 @@ class CampaignPlan:
         return (0.0,) * len(self.onsets) if failing.is_present else self.onsets
 
     def sample_of(self, number: int) -> int:
-        """Return the healthy run that provides the scatter, excluding those for thresholds."""
+        """Return the fault-free run that provides the scatter, excluding those for thresholds."""
         return self.tuning + number % (self.healthy - self.tuning)
 
     @cached_property
     def benches(self) -> tuple[Bench, ...]:
-        """The bench of every healthy run, with its scatter and its noise."""
+        """The bench of every fault-free run, with its scatter and its noise."""
         study = StudyPlan(
             self.name, self.bench, self.varied, seed=self.seed, correlations=self.correlations
         )
@@ -274,12 +274,12 @@ class CampaignPlan:
         return tuple(made)
 
     def case(self, sample: int) -> Case:
-        """Return the healthy run of a sample."""
+        """Return the fault-free run of a sample."""
         return self.benches[sample].cases()[0]
 
     @cached_property
     def taps(self) -> tuple[tuple[Tap, ...], tuple[str, ...]]:
-        """Taps and resting tasks of the model that healthy runs and most faults share."""
+        """Taps and resting tasks of the model that fault-free runs and most faults share."""
         answer = () if self.reaction is None else (self.reaction.failing,)
         shared = [each for each in (*self.faults, *answer) if not self.is_apart(each)]
         return taps_of([fault for each in shared for fault in each.at(0.0, 0)])

@@ -10,22 +10,26 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
+from bywire.core.arguments import checked
 from bywire.core.model import ASSEMBLIES
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array
 
 
+@checked
 def least_of_the_last(values: Array, rows: int) -> Array:
     """Return the minimum of the last rows, including the present one, along the last axis."""
     size = max(min(rows, values.shape[-1]), 1)
     return np.asarray(minimum_filter1d(values, size, axis=-1, origin=(size - 1) // 2))
 
 
+@checked
 def largest_of_the_last(values: Array, rows: int) -> Array:
     """Return the maximum of the last rows, including the present one, along the last axis."""
     return -least_of_the_last(-values, rows)
 
 
+@checked
 def mean_of_the_last(values: Array, rows: int) -> Array:
     """Return the mean of the last rows, including the present one, along the last axis."""
     size = max(min(rows, values.shape[-1]), 1)
@@ -152,12 +156,12 @@ def missed_ticks(task: str, assembly: str, period: float) -> Residual:
 
 
 def threshold(largest: Array, share: float) -> float:
-    """Return the threshold that at most a given fraction of healthy runs exceeds.
+    """Return the threshold that at most a given fraction of fault-free runs exceeds.
 
     Parameters
     ----------
     largest
-        Maximum of each healthy run, shape (cases,).
+        Maximum of each fault-free run, shape (cases,).
     share
         Allowed fraction of false alarms; if it is less than one run, no run exceeds the threshold.
     """
@@ -169,7 +173,7 @@ def threshold(largest: Array, share: float) -> float:
 def detected(lasted: Array, limit: float, time: Array, since: Array) -> Array:
     """Return the time at which a residual first exceeds its threshold [s]; NaN if never.
 
-    A residual that was always inactive in healthy runs has no threshold and detects nothing.
+    A residual that was always inactive in fault-free runs has no threshold and detects nothing.
     """
     if limit <= NEVER:
         return np.full(len(lasted), np.nan)

@@ -40,7 +40,7 @@ class FaultFinding:
     detected
         Time from onset until each residual detects it [s], by name; shape (factors, cases).
     extremes
-        By signal: minimum, maximum and final deviation from the healthy run.
+        By signal: minimum, maximum and final deviation from the fault-free run.
     reacted
         Times of violation with the reaction, by criterion, for runs in which it was possible.
     answered
@@ -197,7 +197,7 @@ class CampaignFindings:
 
     @property
     def false_alarms(self) -> Share:
-        """Fraction of healthy runs, not used for tuning, in which a residual raises an alarm."""
+        """Fraction of fault-free runs, not used for tuning, in which a residual raises an alarm."""
         plan = self.plan
         return share(self.healthy.any_alarm, plan.healthy - plan.tuning, CONFIDENCE)
 
@@ -206,7 +206,7 @@ class CampaignFindings:
         """Warnings from the solver, with the number of faults that caused them."""
         counts = Counter(text for each in self.faults for text in dict.fromkeys(each.doubts))
         return (
-            *(f"healthy runs: {text}" for text in self.healthy.traces.doubts),
+            *(f"fault-free runs: {text}" for text in self.healthy.traces.doubts),
             *(f"runs with {n} of the faults: {text}" for text, n in counts.items()),
         )
 
@@ -379,7 +379,7 @@ def run_campaign(
     """
     if store is not None:
         store.begin(plan, {"name": plan.name})
-    progress("healthy runs", 0.0)
+    progress("fault-free runs", 0.0)
     healthy = judge_healthy(plan, healthy_traces(plan))
     # Each fault uses only a few lanes, so several faults in parallel use the cores better.
     outcomes = complete(

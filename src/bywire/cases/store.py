@@ -2,7 +2,7 @@
 
 Large pieces are files in a folder with a record of the work (`PieceFolder`). Small pieces are
 lines of one file (`PieceLines`). A killed process loses its unfinished pieces. A damaged piece
-counts as missing and is recomputed.
+is treated as missing and is recomputed.
 """
 
 from __future__ import annotations
@@ -186,7 +186,7 @@ class PieceFolder(ABC):
     def _unwritable(self, path: Path, error: OSError) -> FileError:
         return FileError(
             f"cannot write {path}: {error.strerror or error}. Free some space, and resume the "
-            f"{self.NOUN}. Finished pieces are saved",
+            f"{self.NOUN}. Finished work is saved",
             name=str(path),
         )
 

@@ -130,7 +130,7 @@ class Sampler:
         for _ in range(ATTEMPTS):
             drawn = {k: self._leaf(cls, k, self._known[prefix + k]) for k in leaf_fields(cls)}
             try:
-                return cls.create(drawn | chosen)
+                return cls.create(_fitted(cls, drawn) | chosen)
             except ParameterError as error:
                 refusal = error
         raise ParameterError(
@@ -155,6 +155,18 @@ class Sampler:
         if number.nominal <= number.low:
             raise ValueError(f"{number}: the nominal value must be inside the range")
         return number.low + (number.nominal - number.low) * 10 ** self._rng.uniform(-0.3, 0.3)
+
+
+def _fitted(cls: type[ParameterSet], drawn: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return values whose tables fit each other, if a class declares how (``fitting``)."""
+    own = {name: drawn[prefix + name] for name in cls.model_fields if prefix + name in drawn}
+    if hasattr(cls, "fitting"):
+        own = cls.fitting(own)
+    values = {prefix + name: value for name, value in own.items()}
+    for name, info in cls.model_fields.items():
+        if is_parameters(info.annotation):
+            values |= _fitted(typing.cast(Any, info.annotation), drawn, f"{prefix}{name}.")
+    return values
 
 
 def samples_of(
@@ -306,16 +318,11 @@ def set_keeps_its_ranges(par: ParameterSet) -> Iterator[Evidence]:
 
 
 def _says_which(leaf: Leaf, value: float) -> tuple[str, ...]:
-    return leaf.name, str(value)
-
-
-def _says_range(leaf: Leaf, value: float) -> tuple[str, ...]:
-    unit = "" if leaf.unit.symbol == "1" else f" {leaf.unit.symbol}"
-    return f"{value}{unit}", leaf.range_text
+    return leaf.name, leaf.outside_text(value)[0]
 
 
 def _says_both(leaf: Leaf, value: float) -> tuple[str, ...]:
-    return *_says_which(leaf, value), *_says_range(leaf, value)
+    return leaf.name, *leaf.outside_text(value)
 
 
 def refuses_outside(

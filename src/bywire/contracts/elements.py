@@ -156,7 +156,7 @@ def is_signals(annotation: Any) -> bool:
 
 
 def numbers(name: str, annotation: Any) -> dict[str, Number]:
-    """Return all numbers in an annotation by dotted name; a table counts as one number.
+    """Return all numbers in an annotation by dotted name; a table is treated as one number.
 
     Raises
     ------

@@ -295,8 +295,8 @@ def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
             left = (4.0 * each.closing_error - before) / 3.0 / each.turnover
             where = f" in the balance {book!r}" if book else ""
             text = (
-                f"the residual{where} of a {size} run is {abs(left):.1e} of its turnover of "
-                f"{each.turnover:.3g} J"
+                f"the residual{where} of a {size} run is {abs(left):.1e} of the "
+                f"{each.turnover:.3g} J transferred"
             )
             yield measured(abs(left), RESIDUAL, text, place)
 
@@ -370,7 +370,8 @@ def _strongest(trial: Trial, run: Run) -> list[str]:
     for name in known:
         try:
             value = _moved(run, name, INFLUENCE)
-            run.par.replace({name: value})
+            for number in (value, _moved(run, name, -DIFFERENCE)):  # a value may be at its limit
+                run.par.replace({name: number})
         except ParameterError:
             continue
         cases[name] = value

@@ -60,7 +60,7 @@ def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
 def _element(name: str) -> Element:
     """Return an element by its dotted name, or by the last part of the name if it is unique.
 
-    Hyphens count as underscores, because module names have no hyphens.
+    Hyphens are treated as underscores, because module names have no hyphens.
     """
     known, module = every_element(), name.replace("-", "_")
     ends = [full for full in known if full.rpartition(".")[2] == module]

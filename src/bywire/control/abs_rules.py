@@ -73,11 +73,11 @@ class State(NamedTuple):
     """Phase and its start, demand, pressures, next step, and filtered deceleration."""
 
     phase: Annotated[float, Signal("1", "phase of anti-lock control", 3.0)]
-    since: Annotated[float, Signal("s", "time since the last phase or step began", 0.1)]
+    since: Annotated[float, Signal("s", "time since the current phase or step began", 0.1)]
     p_left: Annotated[float, Signal("Pa", "remaining demand", 2e6)]
     p_hat: Annotated[float, Signal("Pa", "pressure assumed by the controller", 2e6)]
     p_held: Annotated[float, Signal("Pa", "last pressure that the road could hold", 2e6)]
-    rise: Annotated[float, Signal("Pa", "next step of the pressure", 1e5)]
+    rise: Annotated[float, Signal("Pa", "next pressure step", 1e5)]
     slowing: Slowing
 
 

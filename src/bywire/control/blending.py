@@ -1,4 +1,4 @@
-"""Blending of a regenerating motor with a friction brake, sampled."""
+"""Sampled blending of a regenerating motor with a friction brake."""
 
 from __future__ import annotations
 

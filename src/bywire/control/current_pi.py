@@ -31,7 +31,7 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Integral part."""
 
-    integral: Annotated[float, Signal("1", "integral part", 0.3)]
+    integral: Annotated[float, Signal("1", "integral term", 0.3)]
 
 
 class Input(NamedTuple):
@@ -54,7 +54,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     .. math:: D = k_p (i_{ref} - i) + I, \quad
         I_{k+1} = I_k + T (k_i (i_{ref} - i) + (D_{sat} - D) / T_t)
 
-    D_sat is D, limited to the lower of the ECU's and the power stage's limit. The integral part
+    D_sat is D, limited to the lower of the ECU's and the power stage's limit. The integral term
     follows the realized duty cycle, not the demanded duty cycle.
     """
     error = u.i_ref - u.i_meas

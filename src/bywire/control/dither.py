@@ -68,7 +68,7 @@ def breakaway_current(
 
     .. math:: i_{brkf} = \frac{k_{brk,p}}{K_e} (T_{pr} + f_{cfr,p} p_{mc})
 
-    As in the paper, the gear efficiency is neglected. Negative pressure counts as zero.
+    As in the paper, the gear efficiency is neglected. Negative pressure is treated as zero.
 
     References
     ----------
@@ -87,8 +87,8 @@ def output(
 ) -> tuple[State, Output]:
     r"""Advance the dither by one sample.
 
-    If a phase differs from the end of a period or half period only by rounding, it counts as this
-    end. A square wave then has the same number of samples above and below zero.
+    If a phase differs from the end of a period or half period only by rounding, it is treated as
+    this end. A square wave then has the same number of samples above and below zero.
 
     .. math:: i_{dit}(t) = A_{dit} \sin(2 \pi f_{dit} t), \quad A_{dit} = i_{brkf}
 

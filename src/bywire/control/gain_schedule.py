@@ -16,6 +16,7 @@ from bywire.core.quantities import (
     Pressure,
 )
 from bywire.core.signals import Signal
+from bywire.core.units import shown
 
 
 class Gains(ParameterSet):
@@ -48,8 +49,8 @@ class Parameters(ParameterSet):
         if not self.p_1 + self.p_blend <= self.p_2:
             raise RuleError(
                 "p_1",
-                f"{self.p_1:g} Pa",
-                f"<= p_2 - p_blend = {self.p_2 - self.p_blend:g} Pa",
+                shown(self.p_1, "Pa"),
+                f"<= p_2 - p_blend = {shown(self.p_2 - self.p_blend, 'Pa')}",
                 "otherwise the blends overlap. Move a boundary, or use a narrower blend",
             )
         return self

@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     zeta: Factor
     """damping ratio; with 1/sqrt(2), the gain at the cutoff frequency is -3 dB"""
     place: Literal["after-dither", "before-dither"]
-    """whether the filter acts on demand plus dither, or only on the demand"""
+    """whether the filter acts on the demand plus the dither, or only on the demand"""
 
 
 class State(NamedTuple):

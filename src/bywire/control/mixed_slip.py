@@ -1,4 +1,4 @@
-"""Mix of a wheel's slip and deceleration, a controlled variable if slip alone is uncertain."""
+"""Mix of a wheel's slip and deceleration, which is controlled if slip alone is uncertain."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
     alpha: Weight
     """weight of the slip"""
     eta_set: Annotated[float, Unit("1", 0.5), Field(ge=0, allow_inf_nan=False)]
-    """set point of the wheel's deceleration relative to gravity"""
+    """set point of the wheel's deceleration in units of g"""
     tau: TimeConstant
     """time constant of the deceleration filter"""
     g: Annotated[float, Unit("m/s**2", 9.81), Field(gt=0, allow_inf_nan=False)]

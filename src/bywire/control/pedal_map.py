@@ -19,7 +19,7 @@ class Parameters(ParameterSet):
     V_nodes: Annotated[Nodes, Unit("V", 2.5)]
     """potentiometer voltages in increasing order"""
     p_nodes: Annotated[Nodes, Unit("Pa", 2e6)]
-    """set points at these voltages"""
+    """set points at the voltages V_nodes"""
 
     @model_validator(mode="after")
     def _is_a_map(self) -> Parameters:

@@ -1,4 +1,4 @@
-"""Motor position control: the current demand adds stiffness and damping to the encoder angle."""
+"""Motor position control: the current demand acts like a spring and damper at the encoder angle."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SampleTime = Annotated[float, Signal("s", "sample time", 2e-4), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """Second-order position loop without an integral part.
+    """Second-order position loop without an integral term.
 
     The brake uses a high bandwidth (60 Hz). A low bandwidth (12 Hz) stays within the current limit.
     """

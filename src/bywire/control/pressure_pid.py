@@ -34,9 +34,9 @@ class Parameters(ParameterSet):
     tau_d: TimeConstant
     """time constant of the derivative filter"""
     b: Weight
-    """set-point weight of the proportional part"""
+    """set-point weight of the proportional term"""
     c: Weight
-    """set-point weight of the derivative part, which acts only on the measurement if it is 0"""
+    """set-point weight of the derivative term, which acts only on the measurement if it is 0"""
     T_t: Duration
     """tracking time of the anti-windup"""
     i_max: Current
@@ -46,8 +46,8 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Integral, filtered derivative, and the differentiated signal."""
 
-    integral: Annotated[float, Signal("A", "integral part", 3.0)]
-    slope: Annotated[float, Signal("A", "derivative part", 1.0)]
+    integral: Annotated[float, Signal("A", "integral term", 3.0)]
+    slope: Annotated[float, Signal("A", "derivative term", 1.0)]
     last: Annotated[float, Signal("Pa", "previous differentiated signal", 2e6)]
 
 

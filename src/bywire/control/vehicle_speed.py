@@ -27,13 +27,13 @@ class Parameters(ParameterSet):
     law: Literal["wheels", "accelerometer"]
     """source of the speed while the wheels slip"""
     a_max: Annotated[float, Unit("m/s**2", 12.0), Field(gt=0, allow_inf_nan=False)]
-    """maximum deceleration of any braking (law "wheels")"""
+    """maximum deceleration in any stop (law "wheels")"""
     slip_small: Weight
-    """slip up to which a wheel counts as reliable (law "accelerometer")"""
+    """slip up to which a wheel is considered reliable (law "accelerometer")"""
     tau: Duration
-    """time constant of the reference's return to a reliable wheel"""
+    """time constant with which the speed estimate returns to the speed of a reliable wheel"""
     v_still: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
-    """speed below which every wheel counts as reliable, which removes errors at standstill"""
+    """speed below which every wheel is considered reliable, which removes errors at standstill"""
 
 
 class State(NamedTuple):

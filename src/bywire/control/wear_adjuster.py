@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     gap_nominal: Length
     """clearance that the adjuster restores"""
     band: Length
-    """tolerated excess of the clearance"""
+    """tolerated excess clearance"""
     gap_min: Length
     """cold clearance below which the adjuster never turns; a hot disc reduces the clearance"""
     tooth: Length

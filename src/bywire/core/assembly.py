@@ -493,14 +493,20 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
 
 def _part_values(w: Assembly[Any, Any], wanted: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
     """Yield all parts' recorded outputs, and the contacts' losses."""
+    works: dict[str, dict[str, None]] = {}  # of all contacts with this loss, each once
+    stored: dict[str, Any] = {}
     for part in w.parts.values():
         for name, there in part.output.items():
             if there in wanted:
                 yield there, part.output_value(name, _wired(w, part))
         for name in part.kept:
             if name in wanted:
-                stored = _wired(w, part).call(part.element.energy)
-                yield name, getattr(w.flow, part.work) - stored
+                energy = _wired(w, part).call(part.element.energy)
+                stored[name] = stored[name] + energy if name in stored else energy
+                works.setdefault(name, {})[part.work] = None
+    for name, energy in stored.items():
+        first, *others = (getattr(w.flow, work) for work in works[name])
+        yield name, sum(others, start=first) - energy
 
 
 def _wired(w: Any, part: AnyPart) -> Wired[Any, Any, Any, Any]:

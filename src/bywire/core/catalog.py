@@ -30,7 +30,7 @@ class Cited:
     kind
         ``paper``: printed in the source. ``derived``: computed from printed values.
         ``chosen``: our choice, without a source. ``calibrated``: tuned to match a statement in the
-        source. The statement then no longer counts as evidence.
+        source. The statement is then no longer treated as evidence.
     where
         Place in the source, or the reason.
     formula
@@ -164,7 +164,7 @@ class CitedSet:
     parameter_class
         Class that validates the values.
     values
-        All values by dotted name, with their provenance. A plain value counts as chosen.
+        All values by dotted name, with their provenance. A plain value is treated as chosen.
     """
 
     name: str

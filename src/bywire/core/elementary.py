@@ -90,12 +90,12 @@ def exp(x: float) -> float:
 
 
 def sin(x: float) -> float:
-    """Return the sine of x [rad]; an angle beyond 1e11 counts as 0."""
+    """Return the sine of x [rad]; an angle beyond 1e11 is treated as 0."""
     return _turned(float(x), 0)
 
 
 def cos(x: float) -> float:
-    """Return the cosine of x [rad]; an angle beyond 1e11 counts as 0."""
+    """Return the cosine of x [rad]; an angle beyond 1e11 is treated as 0."""
     return _turned(float(x), 1)
 
 

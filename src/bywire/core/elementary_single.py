@@ -46,12 +46,12 @@ def exp(x: np.float32) -> np.float32:
 
 
 def sin(x: np.float32) -> np.float32:
-    """Return the sine of x [rad]; an angle beyond 4e7 counts as 0."""
+    """Return the sine of x [rad]; an angle beyond 4e7 is treated as 0."""
     return _turned(x, 0)
 
 
 def cos(x: np.float32) -> np.float32:
-    """Return the cosine of x [rad]; an angle beyond 4e7 counts as 0."""
+    """Return the cosine of x [rad]; an angle beyond 4e7 is treated as 0."""
     return _turned(x, 1)
 
 

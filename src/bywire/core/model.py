@@ -278,8 +278,8 @@ def require_states(model: Any) -> None:
                 raise error.at(f"{where} lists {name!r}, which is not a field of State", ModelError)
             if kind == "stops" and name in found:
                 raise ModelError(
-                    f"{where} lists {name!r}, which is also one of {found[name]}: a stop operator "
-                    "has no other force",
+                    f"{where} lists {name!r}, which is also one of {found[name]}. A stop operator "
+                    "cannot have another force",
                     name=kind,
                     value=str(name),
                 )

@@ -77,7 +77,7 @@ DECAYED = 40.0
 def decay(x: float, *, rests: bool = False) -> float:
     """Return e to the power of -x for a pure number x >= 0, and exactly 0 for x > 40.
 
-    Use it for terms that are added to a number of the order of one. At high speed on a Stribeck
+    Use it for terms that are added to a number on the order of one. At high speed on a Stribeck
     curve, kernels can then skip the exponential.
 
     Parameters

@@ -11,7 +11,7 @@ import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from itertools import chain
 from operator import attrgetter
 from types import MappingProxyType
@@ -27,13 +27,14 @@ from bywire.core.errors import (
     InputError,
     ModelError,
     ParameterError,
+    counted,
     not_valid,
     place_of,
     quoted,
     unknown_name,
 )
-from bywire.core.quantities import Unit
-from bywire.core.units import Written, convert, split
+from bywire.core.quantities import Unit, display_unit, readable_unit
+from bywire.core.units import Written, convert, shown, split, written_unit
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -59,23 +60,62 @@ class Leaf:
 
     @property
     def range_text(self) -> str:
-        """Valid range as text, for example ``> 0 ohm``."""
-        return self.range_in(self.unit.symbol)
+        """Valid range as text, each bound in its most readable unit, for example ``> 0 ohm``."""
+        symbol = self.unit.symbol
+        return self.bounds_text(partial(shown, symbol=symbol)) or _any_number(display_unit(symbol))
 
-    def range_in(self, symbol: str) -> str:
-        """Return the valid range in a unit of the same dimension."""
-        unit = "" if symbol == "1" else f" {symbol}"
-        low, high = self.low, self.high
-        if low == high:
-            return f"exactly {convert(low, self.unit.symbol, symbol):g}{unit}"
-        parts = []
-        if not math.isinf(low):
-            low = convert(low, self.unit.symbol, symbol)
-            parts.append(f"{'>' if self.low_open else '>='} {low:g}{unit}")
-        if not math.isinf(high):
-            high = convert(high, self.unit.symbol, symbol)
-            parts.append(f"{'<' if self.high_open else '<='} {high:g}{unit}")
-        return " and ".join(parts) or f"any finite number{unit and ' in' + unit}"
+    def range_in(self, unit: str) -> str:
+        """Return the valid range in a unit of the same dimension.
+
+        Raises
+        ------
+        UnitError
+            When the unit has another dimension.
+        """
+        write = partial(shown, symbol=self.unit.symbol, unit=unit)
+        return self.bounds_text(write) or _any_number(unit)
+
+    def range_beside(self, text: str) -> str:
+        """Return the valid range in the unit of a text, for example ``>= 0 ms`` for ``"-5 ms"``."""
+        unit = written_unit(text, self.unit.symbol)
+        return self.range_in(unit) if unit else self.range_text
+
+    def bounds_text(self, write: Callable[[float], str]) -> str:
+        """Return the bounds, each written by a function; empty without bounds."""
+        if self.low == self.high:
+            return f"exactly {write(self.low)}"
+        bounds = (
+            (">" if self.low_open else ">=", self.low),
+            ("<" if self.high_open else "<=", self.high),
+        )
+        return " and ".join(f"{sign} {write(end)}" for sign, end in bounds if not math.isinf(end))
+
+    def outside_text(self, value: object, text: str = "") -> tuple[str, str]:
+        """Return an invalid value [SI] and the valid range in one unit.
+
+        ``text``: original text of the value, whose unit both use if it fits; by default, the unit
+        is the value's most readable one.
+        """
+        symbol = self.unit.symbol
+        try:
+            number = math.nan if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError, OverflowError):
+            number = math.nan
+        if not math.isfinite(number):
+            return quoted(value), self.range_text
+        unit = written_unit(text, symbol) or readable_unit(number, symbol)
+        written = shown(number, symbol, unit)
+        if self.admits(convert(float(split(written)[0]), unit, symbol)):  # rounded into the range
+            written = f"{convert(number, symbol, unit)!r}{_spaced(unit)}"
+        return written, self.range_in(unit)
+
+
+def _any_number(unit: str) -> str:
+    return f"any finite number{_spaced(unit) and ' in' + _spaced(unit)}"
+
+
+def _spaced(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
 
 
 # --- Parameter sets
@@ -273,29 +313,27 @@ def _explain(
     if isinstance(rule, RuleError):
         return rule.error_in(name)
     message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
-    shown = "" if isinstance(value, dict) else quoted(value)
-    text = f"{name or owner}: {message}{shown and f', got {shown}'}"
-    return ParameterError(text, name=name or owner, value=shown)
+    got = "" if isinstance(value, dict) else quoted(value)
+    text = f"{name or owner}: {message}{got and f', got {got}'}"
+    return ParameterError(text, name=name or owner, value=got)
 
 
 def _out_of_range(name: str, value: Any, leaf: Leaf, kind: str, text: str) -> InputError:
-    symbol = leaf.unit.symbol
-    number, written = split(text)
-    if symbol == "rad" and written not in ("", symbol):  # drawings specify angles in degrees
-        return not_valid(name, f"{number} {written}", kind + leaf.range_in(written))
-    unit = "" if symbol == "1" else f" {symbol}"
-    got = "" if written in ("", symbol) else f"got {quoted(text)}"
-    return not_valid(name, f"{value}{unit}", kind + leaf.range_text, got)
+    """Return the error for an invalid number, in the unit that the user wrote, if it fits."""
+    written, valid = leaf.outside_text(value, text)
+    is_clear = not split(text)[1] or written_unit(text, leaf.unit.symbol)
+    return not_valid(name, written, kind + valid, "" if is_clear else f"got {quoted(text)}")
 
 
 def _wrong_count(name: str, detail: Mapping[str, Any], texts: Mapping[str, str]) -> InputError:
     """Return the error for a table with too few or too many nodes."""
     context, value = detail["ctx"], detail["input"]
     short = detail["type"] == "too_short"
-    valid = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
+    least, most = context.get("min_length", 0), context.get("max_length", 0)
+    valid = f"at least {counted(least, 'value')}" if short else f"at most {counted(most, 'value')}"
     written = [texts.get(f"{name}.{k}", "") for k in range(len(value))]
     got = quoted(", ".join(written)) if written and all(written) else quoted(value)
-    text = f"{name} must have {valid} values, got {got}"
+    text = f"{name} must have {valid}, got {got}"
     return ParameterError(text, name=name, value=got, valid=valid)
 
 
@@ -478,7 +516,7 @@ def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
 
 
 def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
-    """Reject a class with numbers that have no unit, which would count as structural choices.
+    """Reject a class with numbers that have no unit, which would be treated as structural choices.
 
     Raises
     ------

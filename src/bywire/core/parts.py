@@ -323,7 +323,7 @@ class Part(Generic[X, U, F, P]):
         """Return the slip speeds of its stop operators in the class of an assembly."""
         if not self.has("slip_width"):
             raise ModelError(
-                f"{self.where}: {self.kind} has no slip, since it does not define slip_width",
+                f"{self.where}: {self.kind} has no slip, because it does not define slip_width",
                 name=self.where,
                 valid="slip_width",
             )
@@ -532,7 +532,7 @@ class Sub(Generic[A]):
         target = signal.set_point_of
         return replace(
             signal,
-            label=f"{signal.label}, {self.label}",
+            label=f"{self.label}: {signal.label}",
             role=role,
             set_point_of=self.named(target) if target else "",
         )

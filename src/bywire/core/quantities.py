@@ -87,7 +87,7 @@ def readable_unit(size: float, symbol: str) -> str:
     """
     if not size or symbol not in BY_SIZE:
         return _OF_NOTHING.get(symbol, display_unit(symbol))
-    # A number just below a boundary counts as the boundary: 0.9999999 s is not 1000 ms.
+    # A number just below a boundary is treated as the boundary: 0.9999999 s is not 1000 ms.
     return next(u for least, u in reversed(BY_SIZE[symbol]) if abs(size) * (1 + 1e-6) >= least)
 
 

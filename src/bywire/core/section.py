@@ -146,8 +146,7 @@ def _rejection(
         name, value, kind = f"[{key}] {inner[0]}", value[inner[0]], get_args(info.annotation)[-1]
     if unit is not None:
         leaf = leaf_of(name, unit, info)
-        in_percent = isinstance(value, str) and value.rstrip().endswith("%")
-        valid = leaf.range_in("%") if in_percent else leaf.range_text
+        valid = leaf.range_beside(value) if isinstance(value, str) else leaf.range_text
         return ParameterError(
             f"{name} = {quoted(value)} must be {valid}",
             name=name,

@@ -28,9 +28,9 @@ _LONGEST = 100  # characters; keeps patterns fast for hostile text
 _WORDS = {"1": "a pure number", "delta_degC": "a temperature difference in K"}
 ICE = 273.15
 """0 degC [K]"""
-# Elsewhere, a radian counts as a pure number: N*m equals N*m/rad. If this rule applied here, 60 rpm
-# would become 6.28 Hz, 1 would become 57 degrees, and 2 mm would become 2 mm/rad although the user
-# may mean 2 mm/rev.
+# Elsewhere, a radian is treated as a pure number: N*m equals N*m/rad. If this rule applied here,
+# 60 rpm would become 6.28 Hz, 1 would become 57 degrees, and 2 mm would become 2 mm/rad although
+# the user may mean 2 mm/rev.
 _NO_MATTER_OF_RAD = ("Hz", "rad/s", "rad", "1", "m/rad")
 
 
@@ -223,8 +223,10 @@ def unit_text(symbol: str) -> str:
     return re.sub(r"[A-Za-z]+", lambda m: _SIGNS.get(m[0], m[0]), dotted)
 
 
-def shown(value: float, symbol: str, unit: str = "") -> str:
+def shown(value: float, symbol: str, unit: str = "", digits: int = 6) -> str:
     """Return a value in its most readable unit, for example ``25 bar``, or in another unit.
+
+    ``digits``: significant digits.
 
     Examples
     --------
@@ -233,7 +235,22 @@ def shown(value: float, symbol: str, unit: str = "") -> str:
     """
     unit = unit or readable_unit(value, symbol)
     number = convert(value, symbol, unit)
-    return f"{number:.6g}" + ("" if unit == "1" else f" {unit}")
+    return f"{number:.{digits}g}" + ("" if unit == "1" else f" {unit}")
+
+
+def written_unit(text: str, symbol: str) -> str:
+    """Return the unit of a text if it fits a quantity in an SI unit, otherwise an empty string.
+
+    Examples
+    --------
+    >>> written_unit("-0.02mm", "m"), written_unit("+50%", "m"), written_unit("3", "m")
+    ('mm', '', '')
+    """
+    unit = split(text)[1]
+    try:
+        return unit and (convert(0.0, symbol, unit), unit)[1]
+    except UnitError:
+        return ""
 
 
 def convert(value: F, symbol: str, unit: str) -> F:

@@ -23,7 +23,7 @@ def row_by_row(watch: F) -> F:
 
 
 def outside(values: Any, low: float, high: float) -> Any:
-    """Return which values are outside a range; NaN counts as inside."""
+    """Return which values are outside a range; NaN is treated as inside."""
     return np.logical_or(np.less(values, low), np.greater(values, high))
 
 

@@ -146,7 +146,7 @@ class _Unquoted(str):
 def _plain_text(value: float) -> str:
     """Return a file's plain number as a string that errors quote without quotation marks.
 
-    A string without its required unit is an error, whereas a number would count as SI.
+    A string without its required unit is an error, whereas a number would be treated as SI.
 
     Examples
     --------

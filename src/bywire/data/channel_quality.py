@@ -15,8 +15,8 @@ GAP = 10.0
 """median steps; a longer pause is a gap by default"""
 
 CLIPPED = 10
-"""consecutive samples at the highest or lowest value that count as clipped if the range of the
-sensor is unknown; if it is known, one sample at its end counts"""
+"""consecutive samples at the highest or lowest value that are treated as clipped if the sensor's
+range is unknown; if it is known, one sample at its end is enough"""
 
 
 @dataclass(frozen=True)

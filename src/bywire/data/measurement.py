@@ -364,7 +364,7 @@ def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_Axi
 # bywire never bridges them silently. In a text table, a first row ``time [s], pedal [mm]`` contains
 # names and units. For other files, a mapping contains them.
 
-_GAP = 10.0  # median steps: a pause must be longer to count as a gap
+_GAP = 10.0  # median steps: a pause must be longer to be treated as a gap
 
 Meaning = MeasurementMapping | Mapping[str, Any] | str | Path | None
 """meaning of columns: a mapping, its tables, the path of a mapping file, or None"""

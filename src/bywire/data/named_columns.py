@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -50,6 +50,36 @@ class NamedColumns:
     time: str = ""
     units: Mapping[str, str] | None = None
     driving: Mapping[str, str] = field(default_factory=dict)
+
+
+def reject_swapped(argument: str, columns: Mapping[str, str], known: Collection[str]) -> None:
+    """Reject a pair of signal and column whose names are swapped, as in ``Pressure=p_set``.
+
+    Parameters
+    ----------
+    argument
+        Argument that contains the pairs, for the error.
+    columns
+        Column of each signal.
+    known
+        Valid names of signals.
+
+    Raises
+    ------
+    ParameterError
+        With the swapped form.
+    """
+    for name, column in columns.items():
+        signal = split_title(column)[0]
+        if name not in known and signal in known:
+            right = option(argument, {signal: column.replace(signal, name, 1)})
+            raise ParameterError(
+                f"the signal must precede its column in {option(argument, {name: column})}. "
+                f"Write {right}",
+                name=argument,
+                value=name,
+                valid=right,
+            )
 
 
 def read_named(
@@ -109,6 +139,7 @@ def read_wanted(
         meaning = _timed(meaning, time)
         known = {**meaning.signals, **dict.fromkeys(source.columns if not meaning.signals else ())}
         named = dict(_named(text, known) for text in wanted)
+        _reject_swapped_titles(named, known)
         is_mapped = bool(meaning.signals) and {*named} <= {*wanted}
         if named and not is_mapped:
             signals = {name: _signal(meaning, name, column) for name, column in named.items()}
@@ -135,6 +166,18 @@ def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
             raise unknown_name("signal", column, [str(each) for each in data.data_vars])
         data = data.assign({name: data[column]})
     return data
+
+
+def _reject_swapped_titles(columns: Mapping[str, str], known: Mapping[str, object]) -> None:
+    for name, column in columns.items():
+        if name != column and name in known and not {column, split_title(column)[0]} & {*known}:
+            right = f"{column}={name}"
+            raise ParameterError(
+                f"the signal must precede its column in {name}={column}. Write {right}",
+                name="signals",
+                value=name,
+                valid=right,
+            )
 
 
 def _named(text: str, known: Mapping[str, object]) -> tuple[str, str]:

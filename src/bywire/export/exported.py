@@ -141,7 +141,7 @@ def _row(each: Variable) -> str:
         low, high = (end if math.isfinite(end) else None for end in each.ends)
         wanted = _ends(each) or "any finite number"
     else:
-        (low, high), wanted = finite_range(each.leaf), each.leaf.range_text
+        (low, high), wanted = finite_range(each.leaf), each.leaf.range_in(each.leaf.unit.symbol)
     unit = "" if each.unit == "1" else f" {each.unit}"
     return (
         f"{{{text(each.name)}, {text(unit)}, {text(wanted)}, {_PLACES[each.place]}, {kind}, "

@@ -30,6 +30,7 @@ from bywire.core.parameters import leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.signals import Signal, signals_of, without_noise
 from bywire.core.typing import Array
+from bywire.core.units import shown
 from bywire.data.column_units import measures, unit_of_symbol
 from bywire.identification.measured import RECORD, as_even, require_signals
 from bywire.identification.output_error import Between, even_interval
@@ -147,7 +148,8 @@ def _missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     counts = {name: int(np.isnan(data[name].values).sum()) for name in compared}
     total = data.sizes["time"]
     return [
-        f"{name} lacks {count} of {total} samples ({100.0 * count / total:.2g} %), which bywire "
+        f"{name} is missing {count} of {total} samples ({100.0 * count / total:.2g} %), which "
+        "bywire "
         "does not compare"
         for name, count in counts.items()
         if count
@@ -368,11 +370,12 @@ def _on_grid(
         even, said = as_even(data, aligned.record)
         return even, aligned, tuple(said)
     raise StepError(
-        f"the step of {bench.step:g} s divides neither the measurement's interval of {interval:g} "
-        f"s nor the recording interval of {case.record:g} s. Resample the measurement "
+        f"the step of {shown(bench.step, 's')} divides neither the measurement's interval of "
+        f"{shown(interval, 's')} nor the recording interval of {shown(case.record, 's')}. "
+        "Resample the measurement "
         "('bywire convert --rate')",
         name="step",
-        value=f"{bench.step:g} s",
+        value=shown(bench.step, "s"),
     )
 
 

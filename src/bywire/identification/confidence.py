@@ -56,9 +56,9 @@ def uncertainty(
 
     For white residuals, it is :math:`s^2 (J^T J)^{-1}`. For correlated neighbors, it is the
     sandwich :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}` with the autocovariance :math:`\Gamma`
-    of an autoregressive model of the residuals; fewer residuals then count as independent. White
-    noise may hide slow errors, so bywire repeats the computation for sums of neighbors and uses
-    the largest result.
+    of an autoregressive model of the residuals; fewer residuals are then treated as independent.
+    White noise may hide slow errors, so bywire repeats the computation for sums of neighbors and
+    uses the largest result.
 
     Both formulas assume noise that is independent of the Jacobian. If the residuals are larger
     where the Jacobian is larger (noise that grows with the signal, or a model that is wrong in
@@ -78,7 +78,7 @@ def uncertainty(
     prior_rows
         Number of last rows that contain prior knowledge: independent, standard deviation of one.
     ordered
-        False if the order has no meaning; all residuals then count as independent.
+        False if the order has no meaning; all residuals are then treated as independent.
 
     References
     ----------
@@ -459,7 +459,8 @@ def disagreements(estimates: Mapping[str, Estimate]) -> tuple[Disagreement, ...]
     """
     if len(estimates) < 2:
         raise ParameterError(
-            "a single estimate cannot be compared. Pass one for each record", name="estimates"
+            "a single estimate cannot be compared. Pass one estimate for each record",
+            name="estimates",
         )
     tables = {
         label: {

@@ -43,7 +43,7 @@ class Equation:
     rate
         Measured signal that is its derivative.
     slowest
-        Speed below which a body with dry friction counts as reversing [unit of the state].
+        Speed below which a body with dry friction is treated as reversing [unit of the state].
     unit
         Unit of the equation, for residuals: ``"N*m"`` of a torque balance.
     """

@@ -19,7 +19,7 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import NO_TRIAL, Loss, Problem, Solution, estimate, solve
 from bywire.identification.unknown import moved, scattered
 
-_SAME = 0.01  # of the lowest cost: minima that count as equal
+_SAME = 0.01  # of the lowest cost: minima that are treated as equal
 _ROUGH = 1e-4  # of the cost: enough for a first approach
 _ENDED = 1e-5  # of the cost: enough to distinguish minima; the best one is refined later
 

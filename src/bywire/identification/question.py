@@ -207,7 +207,7 @@ class Options(ParameterSet):
     least_vaf: Share
     """minimum variance accounted for in the held-out record, for each signal"""
     noise: Share
-    """synthetic: standard deviation of an output's noise, relative to its range, by default"""
+    """synthetic: default standard deviation of an output's noise, relative to the output's range"""
 
 
 # --- Unknowns as texts: names, ranges ``LOW..HIGH``, priors ``MEAN +- DEVIATION``

@@ -90,8 +90,8 @@ def estimate_lag(
 
     Notes
     -----
-    A difference between the sensors' time constants also counts as lag. To remove a lag, specify
-    it as ``delay`` in the mapping of the second signal.
+    A difference between the sensors' time constants is also treated as lag. To remove a lag,
+    specify it as ``delay`` in the mapping of the second signal.
     """
     reach = units.parse(largest, "s", "largest")
     if interval is None:
@@ -513,7 +513,7 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     rmse = float(np.sqrt(np.mean(error**2)))
     variance = float(np.var(y)) if np.ptp(y) else 0.0  # not the rounding errors
     lag, lag_note = _lag(part, there)
-    still = "the measured signal does not move"
+    still = "the measured signal does not change"
     return (
         Kpi("rmse", rmse, off, "Root mean square of modeled minus measured."),
         Kpi(

@@ -244,10 +244,10 @@ def _require_alive(plan: LifePlan, z: Values) -> None:
             limit = plan.life.limits[name]
             raise ParameterError(
                 f"life {plan.life.name!r} ends before its first stop, because {limit.label} is "
-                f"{shown(value, limit.unit)} at the start. It must be above zero",
+                f"{shown(value, limit.unit)} at the start. It must be > 0",
                 name=limit.label,
                 value=shown(value, limit.unit),
-                valid="above zero",
+                valid="> 0",
             )
 
 

@@ -39,7 +39,7 @@ class Parameters(ParameterSet):
     C_d: Annotated[float, Unit("J/K", 1e3), Field(gt=0, allow_inf_nan=False)]
     """heat capacity of the body that absorbs the friction work"""
     tau_d: Annotated[float, Unit("s", 300.0), Field(gt=0, allow_inf_nan=False)]
-    """time constant of its cooling"""
+    """time constant of this body's cooling"""
 
 
 def temperatures(work: Array, pause: Array, T_air: Array, par: Parameters) -> tuple[Array, Array]:

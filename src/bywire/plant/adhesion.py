@@ -1,4 +1,4 @@
-"""Tire adhesion on a surface as a function of slip, by Burckhardt or the Magic Formula."""
+"""Tire adhesion on a surface as a function of slip, from Burckhardt or the Magic Formula."""
 
 from __future__ import annotations
 

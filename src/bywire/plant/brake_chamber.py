@@ -10,8 +10,9 @@ from pydantic import Field, model_validator
 from bywire.core import ops
 from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet, RuleError
-from bywire.core.quantities import Force, Nodes, Unit, Volume
+from bywire.core.quantities import Conductance, Force, Nodes, Unit, Volume
 from bywire.core.signals import Energy, Power, Signal
+from bywire.plant import air
 
 SpringStiffness = Annotated[float, Unit("N/m", 8e3), Field(ge=0, allow_inf_nan=False)]
 Travel = Annotated[float, Signal("m", "travel of the rod", 0.03)]
@@ -35,6 +36,8 @@ class Parameters(ParameterSet):
     """preload of the return spring"""
     k_s: SpringStiffness
     """stiffness of the return spring"""
+    G_leak: Conductance
+    """leak conductance of the diaphragm, a volume flow at the reference state per gauge pressure"""
 
     @model_validator(mode="after")
     def _table_is_a_curve(self) -> Parameters:
@@ -47,7 +50,10 @@ class Parameters(ParameterSet):
         return self
 
 
-FAULTS = (ParameterFault("weak-spring", "broken return spring", ("F_s0", "k_s"), 0.3),)
+FAULTS = (
+    ParameterFault("weak-spring", "broken return spring", ("F_s0", "k_s"), 0.3),
+    ParameterFault("torn", "torn diaphragm (value: conductance)", replaced="G_leak", value=2e-8),
+)
 
 
 class Input(NamedTuple):
@@ -89,6 +95,17 @@ def output(u: Input, par: Parameters) -> Output:
     V = V + ops.fmax(u.x - par.x_table[-1], 0.0) * par.A_table[-1]
     A = ops.interpolate(u.x, par.x_table, par.A_table)
     return Output(F=A * u.p - par.F_s0 - par.k_s * u.x, V=V, V_rate=A * u.v)
+
+
+def leak(
+    p: GaugePressure, par: Parameters, gas: air.Parameters
+) -> Annotated[float, Signal("kg/s", "leaking air", 1e-3)]:
+    r"""Return the mass flow through the diaphragm, :math:`\dot m = G \rho_0 p`.
+
+    It is proportional to the gauge pressure. A choked hole would pass air in proportion to the
+    absolute pressure.
+    """
+    return par.G_leak * gas.rho_0 * p
 
 
 def input_rate(u: Input) -> InputRate:

@@ -25,7 +25,12 @@ class Parameters(ParameterSet):
     """pressure drop at which the valve opens"""
 
 
-FAULTS = (ParameterFault("clogged", "narrower seat", ("seat.d",), 0.5),)
+FAULTS = (
+    ParameterFault("clogged", "narrower seat", ("seat.d",), 0.5),
+    ParameterFault(
+        "stuck", "closed ball (value: cracking pressure)", replaced="p_crack", value=5e7
+    ),
+)
 
 
 class Input(NamedTuple):
@@ -47,6 +52,11 @@ def flow(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> orifice.Fl
     """
     drop = ops.fmax(u.p_a - u.p_b - par.p_crack, 0.0)
     return orifice.flow(orifice.Input(p_a=drop, p_b=0.0 * drop, opening=1.0), par.seat, fluid)
+
+
+def pressure_drop(q: orifice.Flow, par: Parameters, fluid: brake_fluid.Parameters) -> Pressure:
+    """Return the pressure drop of a flow > 0, which includes the cracking pressure."""
+    return par.p_crack + orifice.pressure_drop(q, par.seat, fluid)
 
 
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> orifice.Loss:

@@ -52,11 +52,11 @@ FAULTS = (
 
 
 class State(NamedTuple):
-    """Filtered demand, filtered measurement, integral part."""
+    """Filtered demand, filtered measurement, integral term."""
 
     demand: Annotated[float, Signal("A", "filtered current demand", 5.0)]
     sensed: Annotated[float, Signal("A", "sensed current", 5.0)]
-    integral: Annotated[float, Signal("1", "integral part of drive", 0.1)]
+    integral: Annotated[float, Signal("1", "integral term of the current loop of drive", 0.1)]
 
 
 class Rate(NamedTuple):
@@ -64,7 +64,7 @@ class Rate(NamedTuple):
 
     demand: Annotated[float, Signal("A/s", "rate of the demand", 1e3)]
     sensed: Annotated[float, Signal("A/s", "rate of the sensed current", 1e3)]
-    integral: Annotated[float, Signal("1/s", "rate of the integral part", 100.0)]
+    integral: Annotated[float, Signal("1/s", "rate of the integral term", 100.0)]
 
 
 class Input(NamedTuple):
@@ -103,12 +103,12 @@ def output(x: State, u: Input, par: Parameters) -> Output:
 
 
 def rate(x: State, u: Input, par: Parameters) -> Rate:
-    r"""Return the derivatives of filters and integral part.
+    r"""Return the derivatives of filters and integral term.
 
     .. math:: \dot I = k_i e + (\mathrm{sat}(k_p e + I) - k_p e - I)/T_t
 
     The last term is the anti-windup, which is ours and not in the paper. While the stage is off,
-    the integral part decays with T_t.
+    the integral term decays with T_t.
     """
     e = error(x, par)
     unlimited = par.k_p * e + x.integral

@@ -45,7 +45,7 @@ class Parameters(ParameterSet):
     h_0: Convection
     """convection coefficient at rest"""
     h_1: Convection
-    """increase over h_0 at the speed v_ref"""
+    """increase in the heat transfer coefficient above h_0 at the speed v_ref"""
     v_ref: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
     """reference speed of h_1"""
     epsilon: Weight
@@ -53,13 +53,13 @@ class Parameters(ParameterSet):
     sigma: Annotated[float, Unit("W/(m**2*K**4)", 5.67e-8), Field(ge=0, allow_inf_nan=False)]
     """Stefan-Boltzmann constant"""
     G_dp: HeatConductance
-    """conductance from discs to applied pads"""
+    """thermal conductance from the discs to applied pads"""
     G_open: HeatConductance
-    """conductance from discs to released pads"""
+    """thermal conductance from the discs to released pads"""
     G_pf: HeatConductance
-    """conductance from pads to calipers"""
+    """thermal conductance from the pads to the calipers"""
     G_f: HeatConductance
-    """conductance from calipers to the air"""
+    """thermal conductance from the calipers to the air"""
     T_a: Temperature
     """air temperature, and temperature of all bodies before the first stop"""
     T_1: Temperature
@@ -67,13 +67,13 @@ class Parameters(ParameterSet):
     T_2: Temperature
     """disc temperature above which the pads are fully faded"""
     f: Weight
-    """friction of fully faded pads, relative to cold pads"""
+    """friction coefficient of fully faded pads, relative to cold pads"""
     T_boil: Temperature
     """boiling point of fresh fluid at atmospheric pressure"""
     T_wet: Temperature
     """boiling point of fluid with 3.7 % water at atmospheric pressure"""
     T_most: Temperature
-    """disc temperature up to which these values are valid"""
+    """disc temperature up to which the thermal model is valid"""
 
     @model_validator(mode="after")
     def _fades_upward(self) -> Parameters:

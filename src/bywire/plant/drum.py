@@ -12,6 +12,7 @@ from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Length, Unit
 from bywire.core.signals import Power, Signal
+from bywire.core.units import shown
 
 Angle = Annotated[float, Unit("rad", 1.0), Field(ge=0, le=math.pi, allow_inf_nan=False)]
 LiningFriction = Annotated[float, Unit("1", 0.3), Field(gt=0, lt=1, allow_inf_nan=False)]
@@ -55,7 +56,9 @@ class Parameters(ParameterSet):
                 "theta_2", f"{math.degrees(self.theta_2):.4g} deg", f"> theta_1 = {low:.4g} deg"
             )
         if not self.c > self.a:
-            raise RuleError("c", f"{self.c:g} m", f"> the pivot distance a = {self.a:g} m")
+            raise RuleError(
+                "c", shown(self.c, "m"), f"> the pivot distance a = {shown(self.a, 'm')}"
+            )
         k_0, k_1 = coefficients(self)
         if not (k_1 <= 0.0 or self.mu <= LOCKING * k_0 / k_1):
             limit = LOCKING * k_0 / k_1

@@ -28,13 +28,13 @@ class Parameters(ParameterSet):
     T_wet: Temperature
     """boiling point of fluid with the water fraction ``water_wet``"""
     water_wet: Annotated[float, Unit("1", 0.037), Field(gt=0, lt=1, allow_inf_nan=False)]
-    """fraction of water in wet fluid, up to which these values are valid"""
+    """fraction of water in wet fluid, up to which the vapor model is valid"""
     V: Volume
     """volume of the hot fluid"""
     growth: Growth
     """vapor volume per fluid volume and kelvin above the boiling point, at ambient pressure"""
     T_most: Temperature
-    """fluid temperature up to which these values are valid"""
+    """fluid temperature up to which the vapor model is valid"""
 
     @model_validator(mode="after")
     def _boils_within_its_range(self) -> Parameters:

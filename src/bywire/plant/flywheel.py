@@ -35,7 +35,7 @@ class Parameters(ParameterSet):
     K_drive: SpeedGain
     """gain of the speed controller (law "driven")"""
     Omega_still: StillSpeed
-    """speed up to which the disc counts as stopped"""
+    """speed up to which the disc is considered stopped"""
     runout: RunOut
     """amplitude of the runout that the floating caliper does not follow"""
 

@@ -1,4 +1,4 @@
-"""Force sensor between two screws. Both screws and the sensor are one spring."""
+"""Force sensor between two screws. Both screws and the sensor act as one spring."""
 
 from __future__ import annotations
 

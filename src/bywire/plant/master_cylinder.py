@@ -10,6 +10,7 @@ from pydantic import model_validator
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Area, Damping, Length
 from bywire.core.signals import Energy, FluidCompliance, Power, Role, Signal
+from bywire.core.units import shown
 from bywire.plant import brake_fluid
 
 Loss = Annotated[float, Signal("W", "fluid damping loss", role=Role("sink", "fluid damping"))]
@@ -34,15 +35,17 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
         if not self.x_nominal < self.s_mc:
-            valid = f"< the chamber length s_mc = {self.s_mc:g} m"
-            raise RuleError("x_nominal", f"{self.x_nominal:g} m", valid)
+            valid = f"< the chamber length s_mc = {shown(self.s_mc, 'm')}"
+            raise RuleError("x_nominal", shown(self.x_nominal, "m"), valid)
         if not self.x_rest < self.x_end:
-            raise RuleError("x_end", f"{self.x_end:g} m", f"> x_rest = {self.x_rest:g} m")
+            raise RuleError(
+                "x_end", shown(self.x_end, "m"), f"> x_rest = {shown(self.x_rest, 'm')}"
+            )
         if not self.x_end < self.s_mc:
             raise RuleError(
                 "x_end",
-                f"{self.x_end:g} m",
-                f"< the chamber length s_mc = {self.s_mc:g} m",
+                shown(self.x_end, "m"),
+                f"< the chamber length s_mc = {shown(self.s_mc, 'm')}",
                 "move the end stop forward or lengthen the chamber",
             )
         return self

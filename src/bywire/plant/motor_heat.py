@@ -49,9 +49,9 @@ class Parameters(ParameterSet):
     C_h: HeatCapacity
     """heat capacity of housing and magnets"""
     G_wh: HeatConductance
-    """conductance from winding to housing"""
+    """thermal conductance from the winding to the housing"""
     G_ha: HeatConductance
-    """conductance from housing to the air"""
+    """thermal conductance from the housing to the air"""
     a_R: TemperatureCoefficient
     """increase in resistance with winding temperature (copper)"""
     a_K: TemperatureCoefficient

@@ -17,6 +17,8 @@ from bywire.plant import brake_fluid
 DischargeCoefficient = Annotated[float, Unit("1", 0.65), Field(gt=0, le=1, allow_inf_nan=False)]
 CriticalReynolds = Annotated[float, Unit("1", 100.0), Field(gt=0, allow_inf_nan=False)]
 Opening = Annotated[float, Signal("1", "opened fraction of the area", 1.0, low=0.0, high=1.0)]
+Lift = Annotated[float, Signal("m", "lift of the cone", 1e-4, low=0.0)]
+HalfAngle = Annotated[float, Signal("rad", "half of the cone's angle", 0.8)]
 Flow = Annotated[float, Signal("m**3/s", "flow", 1e-5)]
 Loss = Annotated[float, Signal("W", "throttling loss", role=Role("sink", "throttling"))]
 
@@ -46,6 +48,19 @@ class Input(NamedTuple):
 def area(par: Parameters) -> Annotated[float, Signal("m**2", "area", 2e-7)]:
     r"""Return the area of the open orifice, :math:`A = \pi d^2 / 4`."""
     return 0.25 * math.pi * par.d * par.d
+
+
+def conical_opening(x: Lift, alpha: HalfAngle, par: Parameters) -> Opening:
+    r"""Return the opened fraction of an orifice that a cone closes.
+
+    .. math:: \frac{A(x)}{A} = \min\left(\frac{\pi d x \sin\alpha}{\pi d^2 / 4}, 1\right)
+
+    Notes
+    -----
+    It has a kink at the lift :math:`d / (4 \sin\alpha)`, where the conical gap becomes as large as
+    the orifice. Linear models of a fully open valve have no kink if the full lift is larger.
+    """
+    return ops.fmin(4.0 * x * ops.sin(alpha) / par.d, 1.0)
 
 
 def coefficient(
@@ -85,6 +100,17 @@ def flow(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Flow:
     drop, p_cr = u.p_a - u.p_b, critical_pressure(par, fluid)
     K = u.opening * coefficient(par, fluid)
     return K * drop / ops.sqrt(ops.sqrt(drop * drop + p_cr * p_cr))
+
+
+def pressure_drop(q: Flow, par: Parameters, fluid: brake_fluid.Parameters) -> Pressure:
+    r"""Return the pressure drop of a flow, the inverse of `flow` for the open orifice.
+
+    .. math:: \Delta p = \frac{q}{K} \sqrt{\tfrac{1}{2} (z + \sqrt{z^2 + 4 p_{cr}^2})},
+        \quad z = (q/K)^2
+    """
+    ratio, p_cr = q / coefficient(par, fluid), critical_pressure(par, fluid)
+    z = ratio * ratio
+    return ratio * ops.sqrt(0.5 * (z + ops.sqrt(z * z + 4.0 * p_cr * p_cr)))
 
 
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Loss:

@@ -1,4 +1,4 @@
-r"""Hysteresis of pads and caliper: springs that slip, beside the elastic curve (Maxwell slip).
+r"""Hysteresis of pads and caliper: slipping springs parallel to the elastic curve (Maxwell slip).
 
 Four springs follow the compression and slip at their slip forces, so their force depends on the
 compression's reversals, and not on its speed. Together with the elastic curve f,

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from bywire.core.faults import ParameterFault
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import FluxLinkage, Inductance, PolePairs, Resistance, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
+from bywire.core.typing import Array
+from bywire.core.validity import row_by_row
+from bywire.plant import flux_map
 
 Hysteresis = Annotated[float, Unit("W/(V**2*s)", 10.0), Field(ge=0, allow_inf_nan=False)]
 Eddy = Annotated[float, Unit("W/V**2", 1e-3), Field(ge=0, allow_inf_nan=False)]
@@ -19,21 +22,27 @@ IronLoss = Annotated[float, Signal("W", "iron loss", role=Role("sink", "iron"))]
 
 
 class Parameters(ParameterSet):
-    """Constant inductances and sinusoidal flux. Amplitudes refer to phase quantities.
+    """Sinusoidal flux. Amplitudes refer to phase quantities.
 
-    The d axis is along the magnets, and the q axis is 90 degrees (electrical) ahead. Surface
-    magnets have ``L_d = L_q``, interior magnets ``L_d < L_q``. ``iron``: with ``"drag"``, the iron
-    loss is a torque against the rotation, and not a current.
+    The d axis is along the magnets, and the q axis is 90 degrees (electrical) ahead. ``law``: with
+    ``"linear"``, inductances are constant; surface magnets have ``L_d = L_q``, interior magnets
+    ``L_d < L_q``. With ``"saturated"``, ``map`` contains the flux linkages of the currents. The
+    magnets' flux linkage adds to them, so weaker magnets do not change the map. ``iron``: with
+    ``"drag"``, the iron loss is a torque against the rotation, and not a current.
     """
 
+    law: Literal["linear", "saturated"]
+    """relation between currents and flux linkages"""
     p: PolePairs
     """number of pole pairs"""
     R: Resistance
     """phase resistance"""
     L_d: Inductance
-    """d-axis inductance"""
+    """d-axis inductance (law "linear")"""
     L_q: Inductance
-    """q-axis inductance"""
+    """q-axis inductance (law "linear")"""
+    map: flux_map.Parameters
+    """flux linkages of the currents (law "saturated"); otherwise empty tables"""
     psi: FluxLinkage
     """amplitude of the magnet flux linkage"""
     iron: Literal["off", "drag"]
@@ -42,6 +51,12 @@ class Parameters(ParameterSet):
     """hysteresis loss coefficient (iron "drag")"""
     c_e: Eddy
     """eddy-current loss coefficient (iron "drag")"""
+
+    @model_validator(mode="after")
+    def _has_a_map(self) -> Parameters:
+        if self.law == "saturated" and not self.map.i_d:
+            raise RuleError("map.i_d", "an empty table", "a table if law = 'saturated'")
+        return self
 
 
 FAULTS = (
@@ -94,12 +109,26 @@ class Output(NamedTuple):
 
 
 def flux(x: State, par: Parameters) -> Flux:
-    r"""Return the flux linkages, :math:`\psi_d = \psi + L_d i_d`, :math:`\psi_q = L_q i_q`."""
+    r"""Return the flux linkages, :math:`\psi_d = \psi + L_d i_d`, :math:`\psi_q = L_q i_q`.
+
+    With law "saturated", the map replaces the products of inductance and current.
+    """
+    if par.law == "saturated":
+        own = flux_map.flux(flux_map.Currents(*x), par.map)
+        return Flux(psi_d=par.psi + own.psi_d, psi_q=own.psi_q)
     return Flux(psi_d=par.psi + par.L_d * x.i_d, psi_q=par.L_q * x.i_q)
 
 
 def mass(x: State, par: Parameters) -> Factors:
-    """Return the factors of the currents' derivatives, which are the inductances."""
+    r"""Return the factors of the currents' derivatives, which are the inductances.
+
+    With law "saturated", they are those of one axis while the other axis is short-circuited,
+    :math:`L_{dd} - L_{dq}^2/L_{qq}` and :math:`L_{qq} - L_{dq}^2/L_{dd}`.
+    """
+    if par.law == "saturated":
+        L = flux_map.inductances(flux_map.Currents(*x), par.map)
+        square = L.L_dq * L.L_dq
+        return Factors(i_d=L.L_dd - square / L.L_qq, i_q=L.L_qq - square / L.L_dd)
     return Factors(i_d=par.L_d, i_q=par.L_q)
 
 
@@ -111,16 +140,22 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
         L_q \frac{di_q}{dt} = v_q - R i_q - \omega_e (L_d i_d + \psi), \quad
         \omega_e = p \omega
 
+    With law "saturated", these voltages :math:`e_d` and :math:`e_q` are the derivatives of the flux
+    linkages. The balance of the currents is then :math:`e_d - e_q L_{dq}/L_{qq}` and
+    :math:`e_q - e_d L_{dq}/L_{dd}`.
+
     References
     ----------
     R. H. Park, "Two-Reaction Theory of Synchronous Machines", Trans. AIEE 48, 1929. The
     documentation of MathWorks' "MTPA Control Reference" has this form.
     """
     omega_e, f = par.p * u.omega, flux(x, par)
-    return Balance(
-        i_d=u.v_d - par.R * x.i_d + omega_e * f.psi_q,
-        i_q=u.v_q - par.R * x.i_q - omega_e * f.psi_d,
-    )
+    e_d = u.v_d - par.R * x.i_d + omega_e * f.psi_q
+    e_q = u.v_q - par.R * x.i_q - omega_e * f.psi_d
+    if par.law == "saturated":
+        L = flux_map.inductances(flux_map.Currents(*x), par.map)
+        return Balance(i_d=e_d - L.L_dq / L.L_qq * e_q, i_q=e_q - L.L_dq / L.L_dd * e_d)
+    return Balance(i_d=e_d, i_q=e_q)
 
 
 def airgap_torque(
@@ -128,7 +163,10 @@ def airgap_torque(
 ) -> Annotated[float, Signal("N*m", "air-gap torque", 0.3)]:
     r"""Return the torque due to the currents.
 
-    .. math:: T = \tfrac{3}{2} p (\psi + (L_d - L_q) i_d) i_q
+    .. math:: T = \tfrac{3}{2} p (\psi_d i_q - \psi_q i_d)
+        = \tfrac{3}{2} p (\psi + (L_d - L_q) i_d) i_q
+
+    The second form is valid for law "linear".
     """
     f = flux(x, par)
     return 1.5 * par.p * (f.psi_d * x.i_q - f.psi_q * x.i_d)
@@ -166,7 +204,15 @@ def _eddy_slope(x: State, par: Parameters) -> float:
 
 
 def energy(x: State, par: Parameters) -> Energy:
-    r"""Return the magnetic energy, :math:`\tfrac{3}{4} (L_d i_d^2 + L_q i_q^2)`."""
+    r"""Return the magnetic energy, :math:`\tfrac{3}{4} (L_d i_d^2 + L_q i_q^2)`.
+
+    With law "saturated", it is :math:`\tfrac{3}{2} (\psi_d i_d + \psi_q i_q - W')`, with the flux
+    linkages of the currents and their coenergy W'.
+    """
+    if par.law == "saturated":
+        i = flux_map.Currents(*x)
+        own = flux_map.flux(i, par.map)
+        return 1.5 * (own.psi_d * x.i_d + own.psi_q * x.i_q - flux_map.coenergy(i, par.map))
     return 0.75 * (par.L_d * x.i_d * x.i_d + par.L_q * x.i_q * x.i_q)
 
 
@@ -188,3 +234,11 @@ def power_loss(x: State, par: Parameters) -> Loss:
 def iron_loss(x: State, omega: MotorSpeed, par: Parameters) -> IronLoss:
     """Return the eddy-current loss, >= 0. The model's dry friction contains the hysteresis."""
     return 0.0 * omega if par.iron == "off" else _eddy_slope(x, par) * omega * omega
+
+
+@row_by_row
+def watch(t: Array, x: State, par: Parameters) -> list[str]:
+    """Warn if the currents leave the flux map."""
+    if par.law == "linear":
+        return []
+    return list(flux_map.watch(t, flux_map.Currents(*x), par.map))

@@ -11,6 +11,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import SignedPressure
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
+from bywire.core.units import shown
 from bywire.core.validity import first, outside, row_by_row
 
 AbsolutePressure = Annotated[float, Signal("Pa", "absolute pressure", 2e6)]
@@ -25,12 +26,14 @@ class Parameters(ParameterSet):
     p_high: SignedPressure
     """maximum absolute pressure of the range"""
     place: Literal["master-cylinder", "mid-pipeline"]
-    """position; mid-pipeline measures the mean of the pressures at both ends"""
+    """sensor position; mid-pipeline measures the mean of the pressures at both ends"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
         if not self.p_low < self.p_high:
-            raise RuleError("p_low", f"{self.p_low:g} Pa", f"< p_high = {self.p_high:g} Pa")
+            raise RuleError(
+                "p_low", shown(self.p_low, "Pa"), f"< p_high = {shown(self.p_high, 'Pa')}"
+            )
         return self
 
 

@@ -10,6 +10,7 @@ from bywire.core import ops
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Factor, Unit
 from bywire.core.signals import Signal
+from bywire.core.units import shown
 from bywire.plant.adhesion import Surface, SurfaceParameters, surface_of
 
 Distance = Annotated[float, Unit("m", 15.0), Field(ge=0, allow_inf_nan=False)]
@@ -69,8 +70,8 @@ class Parameters(ParameterSet):
         if not self.x_back >= self.x_change + self.ramp:
             raise RuleError(
                 "x_back",
-                f"{self.x_back:g} m",
-                f">= x_change + ramp = {self.x_change + self.ramp:g} m",
+                shown(self.x_back, "m"),
+                f">= x_change + ramp = {shown(self.x_change + self.ramp, 'm')}",
                 "the second surface must start before it ends",
             )
         return self

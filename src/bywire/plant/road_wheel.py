@@ -1,4 +1,4 @@
-"""Wheel on the road, with brake and rolling resistance combined into one dry friction."""
+"""Wheel on the road, with brake and rolling resistance combined into one dry-friction torque."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Parameters(ParameterSet):
     r: Length
     """rolling radius"""
     C_rr: Annotated[float, Unit("1", 0.015), Field(ge=0, lt=1, allow_inf_nan=False)]
-    """rolling resistance force relative to load"""
+    """rolling resistance force relative to the wheel load"""
 
 
 class State(NamedTuple):

@@ -18,9 +18,9 @@ BackEfficiency = Annotated[float, Unit("1", 0.5), Field(ge=-10, le=1, allow_inf_
 class Parameters(ParameterSet):
     """Massless screw with friction proportional to its load.
 
-    ``law``: with ``"load"`` (reading A), the loss is friction proportional to the axial force and
-    set-valued at rest. With ``"drive"`` (reading B), the screw loses (1 - eta_f) of the motor
-    torque in either direction.
+    ``law``: with ``"load"`` (interpretation A), the loss is friction proportional to the axial
+    force and set-valued at rest. With ``"drive"`` (interpretation B), the screw loses (1 - eta_f)
+    of the motor torque in either direction.
     """
 
     lead: Length

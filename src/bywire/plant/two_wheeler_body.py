@@ -12,6 +12,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Length, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
+from bywire.core.units import shown
 from bywire.core.validity import first, highest, row_by_row
 
 BodyMass = Annotated[float, Unit("kg", 250.0), Field(gt=0, allow_inf_nan=False)]
@@ -39,7 +40,7 @@ class Parameters(ParameterSet):
     h: Length
     """height of the center of gravity"""
     h_a: Length
-    """height at which air drag acts"""
+    """height at which aerodynamic drag acts"""
     inertia: BodyInertia
     """pitch inertia about the center of gravity"""
     CdA: Annotated[float, Unit("m**2", 0.4), Field(ge=0, allow_inf_nan=False)]
@@ -57,7 +58,9 @@ class Parameters(ParameterSet):
     def _stands(self) -> Parameters:
         if not self.l_f < self.L:
             reason = "the center of gravity is between the wheels"
-            raise RuleError("l_f", f"{self.l_f:g} m", f"< the wheelbase L = {self.L:g} m", reason)
+            raise RuleError(
+                "l_f", shown(self.l_f, "m"), f"< the wheelbase L = {shown(self.L, 'm')}", reason
+            )
         return self
 
 
@@ -147,8 +150,8 @@ def rear_load(
 
 
 def rigid_rear_load(
-    mu_f: Annotated[float, Signal("1", "front braking force relative to load", 1.0)],
-    mu_r: Annotated[float, Signal("1", "rear braking force relative to load", 1.0)],
+    mu_f: Annotated[float, Signal("1", "front braking force relative to the wheel load", 1.0)],
+    mu_r: Annotated[float, Signal("1", "rear braking force relative to the wheel load", 1.0)],
     F_d: Annotated[float, Signal("N", "air drag", 100.0)],
     cosine: Cosine,
     par: Parameters,

@@ -22,7 +22,7 @@ class Parameters(adhesion.Parameters):
     sigma: Length
     """relaxation length"""
     c_t: Annotated[float, Unit("s/m", 1.0), Field(ge=0, allow_inf_nan=False)]
-    """damping of the sticking tire near standstill, relative to load"""
+    """damping of the sticking tire near standstill, relative to the wheel load"""
     v_low: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
     """speed above which the damping c_t is zero"""
     tau_slide: Duration

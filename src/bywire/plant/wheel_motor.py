@@ -1,4 +1,4 @@
-"""Motor at a wheel that brakes and recovers energy, within the limits of motor and battery."""
+"""Wheel motor that brakes and recovers energy within the limits of the motor and the battery."""
 
 from __future__ import annotations
 

@@ -163,8 +163,8 @@ def phases(
     active
         Whether the mode is active from this sample to the next, shape ``(n,)``.
     columns
-        Pixel columns. If there are more spans than half of them, a column counts as active when the
-        mode is active for at least half of it.
+        Pixel columns. If there are more spans than half of them, a column is treated as active
+        when the mode is active for at least half of it.
 
     Returns
     -------

@@ -237,7 +237,8 @@ class Document:
     has_files
         Whether it can be written to a folder; its JSON object then lists the files.
     headline
-        Most important message: the first words on a terminal and in the JSON object.
+        Most important message: the first entry of the JSON object. A terminal shows it as a warning
+        and in the verdict.
     changes
         The user's changes, which a terminal shows first and the JSON object contains by name; None
         if nothing can be changed. On pages a section shows them (`bywire.report.subject`).

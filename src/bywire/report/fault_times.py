@@ -71,14 +71,14 @@ Curve = Sequence[tuple[float, int, float, int]]
 
 
 def alarm_curves(curves: Mapping[str, Curve], healthy: int) -> Figure:
-    """Draw each residual's detection delay of dangerous faults versus alarms in healthy runs.
+    """Draw each residual's detection delay of dangerous faults versus alarms in fault-free runs.
 
     Parameters
     ----------
     curves
         Residual -> factor of the threshold, alarms, median delay [s], number of detected runs.
     healthy
-        Number of judged healthy runs.
+        Number of judged fault-free runs.
     """
     figure, (axes,) = style.new_figure(3.2)
     markers = "osD^vPX*<>"
@@ -110,7 +110,7 @@ def alarm_curves(curves: Mapping[str, Curve], healthy: int) -> Figure:
     axes.set_xscale("symlog", linthresh=100.0 / healthy)
     axes.set_yscale("log")
     style.log_ticks(axes.yaxis)
-    axes.set_xlabel("healthy runs with an alarm [%]")
+    axes.set_xlabel("fault-free runs with an alarm [%]")
     axes.set_ylabel("median delay [ms]")
     style.legend_above(axes)
     return figure

@@ -253,7 +253,7 @@ def differences(
             color=look.color,
             linestyle=look.linestyle,
             linewidth=look.linewidth,
-            label="counts as agreement",
+            label="limit of agreement",
         )
         axes.set_yscale("log")
         axes.set_ylabel(f"difference of {label}")

@@ -36,7 +36,6 @@ def terminal_text(document: Document, verbose: bool = False) -> str:
 
     ``verbose``: with definitions, explanations and all rows of long tables.
     """
-    first = [textwrap.fill(document.headline, _width()), ""] if document.headline else []
     changed = [_bullet(text) for text in change_texts(document.changes or ())]
     lines: list[str] = []
     for block in document.brief:
@@ -46,7 +45,7 @@ def terminal_text(document: Document, verbose: bool = False) -> str:
             lines.append(text)
     if lines and not lines[-1]:
         lines.pop()
-    return "\n".join([*first, *changed, *lines])
+    return "\n".join([*changed, *lines])
 
 
 def verdict_line(document: Document) -> str:

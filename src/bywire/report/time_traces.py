@@ -655,7 +655,7 @@ def _factor(recordings: Sequence[xr.Dataset]) -> tuple[float, str]:
 # --- Differences: each recording minus the first, at the first recording's times
 
 _LEAST = 1e-9
-"""fraction of a signal's maximum magnitude below which a difference counts as rounding"""
+"""fraction of a signal's maximum magnitude below which a difference is treated as rounding"""
 
 
 def difference_figure(recordings: Mapping[str, xr.Dataset]) -> Figure | None:

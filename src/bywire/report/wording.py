@@ -229,16 +229,7 @@ def range_text(leaf: Leaf, value: object = None) -> str:
             return amount(bound, symbol, 6)
         return _with_unit(_figures(convert(float(bound), symbol, unit), symbol, 6), unit)
 
-    if leaf.low == leaf.high:
-        return f"exactly {bound_text(leaf.low)}"
-    limits = []
-    for sign, bound, is_open in (
-        (">", leaf.low, leaf.low_open),
-        ("<", leaf.high, leaf.high_open),
-    ):
-        if math.isfinite(bound):
-            limits.append(f"{sign if is_open else sign + '='} {bound_text(bound)}")
-    return " and ".join(limits) or "any finite number"
+    return leaf.bounds_text(bound_text) or "any finite number"
 
 
 def unit_beside(value: object, symbol: str) -> str:

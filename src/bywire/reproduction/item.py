@@ -32,7 +32,7 @@ class Allowance:
     what
         Compared quantity.
     size
-        Maximum difference that counts as agreement.
+        Maximum difference that is treated as agreement.
     unit
         Unit of ``size``, or `SHARE`.
     reason
@@ -96,7 +96,7 @@ class Item:
     stated, computed
         The two numbers; None if missing.
     tolerance
-        Maximum difference that counts as agreement; ``"<="`` or ``">="`` if the statement is a
+        Maximum difference that is treated as agreement; ``"<="`` or ``">="`` if the statement is a
         bound on the computed number; None without a verdict.
     agrees
         None if the source states nothing, or if the value was tuned to the statement.

@@ -124,16 +124,16 @@ def peak(recording: xr.Dataset, name: str) -> float:
     return float(np.max(recording[name].values))
 
 
-# --- Statements as tables
+# --- Published values as tables
 
 _KINDS = (
-    "Kinds of statements: 'printed' is in the source's text, tables or equations, or follows "
-    "from printed numbers by an equation in the note. 'reading' is a sentence of the source that "
-    "we interpret as a number (see its note). 'axis' is the end of a figure's axis, beyond which "
-    "the source shows nothing. 'requirement' is a design requirement. 'physical bound' is a limit "
-    "that we derive. 'ours' is a number without a counterpart in the source. A statement has no "
-    "verdict if the source states nothing, if the value is an input or was tuned to the "
-    "statement, or if the verdict belongs to another statement."
+    "Kinds of values: 'printed' is in the source's text, tables or equations, or follows from "
+    "printed numbers by an equation in the note. 'reading' is a sentence of the source that we "
+    "interpret as a number (see its note). 'axis' is the end of a figure's axis, beyond which the "
+    "source shows nothing. 'requirement' is a design requirement. 'physical bound' is a limit "
+    "that we derive. 'ours' is a number without a counterpart in the source. A value has no "
+    "verdict if the source publishes none, if it is an input or was tuned to match the source, or "
+    "if the verdict belongs to another value."
 )
 
 
@@ -202,6 +202,7 @@ def tallies(items: Iterable[Item]) -> dict[str, Tally]:
 
 # --- Reproductions
 
+_ADVICE = "For your own work"
 _THREADS = 4  # more would only wait for the Python interpreter
 
 
@@ -264,8 +265,8 @@ class Contradiction:
     items: Sequence[Item]
 
     def counted(self, judged: int) -> str:
-        """Return the number of statements, out of all that have a verdict."""
-        return f"{len(self.items)} of {judged} judged statements"
+        """Return the number of values that disagree, out of all that have a verdict."""
+        return f"{len(self.items)} of {judged} judged values"
 
     @property
     def lines(self) -> list[str]:
@@ -278,12 +279,12 @@ class Contradiction:
     @property
     def listing(self) -> Listing:
         """Title and causes for a terminal."""
-        return Listing(self.lines or ["No statement."], self.title)
+        return Listing(self.lines or ["No published value."], self.title)
 
     @property
     def blocks(self) -> list[Block]:
         """Causes for a page."""
-        return [Listing(self.lines)] if self.lines else [Paragraph("No statement.")]
+        return [Listing(self.lines)] if self.lines else [Paragraph("No published value.")]
 
 
 def _cause_lines(causes: Iterable[RootCause], items: Sequence[Item]) -> list[str]:
@@ -313,6 +314,8 @@ class Reproduction(Answer):
         The tolerances with their reasons.
     sets
         Titles of the parameter sets, by the text after ``@`` in an item's id.
+    advice
+        What the agreements and disagreements mean for users of the model.
     """
 
     source: str
@@ -321,6 +324,7 @@ class Reproduction(Answer):
     causes: tuple[RootCause, ...] = ()
     allowances: tuple[Allowance, ...] = ()
     sets: Mapping[str, str] = field(default_factory=dict)
+    advice: str = ""
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -372,6 +376,7 @@ class Reproduction(Answer):
         """Return a document of contradictions, then statements with computed numbers by part."""
         hint = f"bywire reproduce {self.source} --out FOLDER"
         counts = Listing(self._counts(), "Verdicts by parameter set")
+        advice: list[str | Block] = [Listing([self.advice], _ADVICE), ""] if self.advice else []
         contradictions = self.contradictions
         return Document(
             f"Reproduction of {self.source}",
@@ -383,6 +388,7 @@ class Reproduction(Answer):
                 "",
                 counts,
                 "",
+                *advice,
                 *self._tables(),
                 f"Report with notes, tolerances and figures: {hint}",
             ],
@@ -403,7 +409,7 @@ class Reproduction(Answer):
         ours, theirs = (len(each.items) for each in self.contradictions)
         agree = _tally(self.items).agree
         return (
-            f"bywire contradicts the paper in {ours} of {self._judged} judged statements, the "
+            f"bywire contradicts the paper in {ours} of {self._judged} judged values, the "
             f"paper contradicts itself in {theirs}, and {agree} agree"
         )
 
@@ -411,13 +417,13 @@ class Reproduction(Answer):
         """Return the tables for a terminal: other verdicts, collapsed, and the parts' tables."""
         rest = [item for part in self.parts if not part.tables for item in part.items]
         lines: list[str | Block] = []
-        lines += [Details("All statements", [TableBlock(verdicts(rest))]), ""] if rest else []
+        lines += [Details("All published values", [TableBlock(verdicts(rest))]), ""] if rest else []
         for title, table in (pair for part in self.parts for pair in part.tables.items()):
             lines += [title, TableBlock(table), ""]
         return lines
 
     def _sections(self, counts: Listing) -> list[Section]:
-        sections = []
+        sections = [Section(_ADVICE, [Paragraph(self.advice)])] if self.advice else []
         for each in self.contradictions:
             table = [TableBlock(statements(each.items))] if each.items else []
             title = f"{each.title}: {each.counted(self._judged)}"

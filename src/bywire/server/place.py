@@ -139,7 +139,7 @@ class Place:
         """Move an uploaded measurement to the first free name, and return its path.
 
         This never replaces existing files, even if several files with one name arrive at the same
-        time. Names that differ only in case count as equal, because some systems ignore case.
+        time. Names that differ only in case are treated as equal, because some systems ignore case.
 
         Raises
         ------

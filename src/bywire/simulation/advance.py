@@ -105,8 +105,8 @@ def require_work(work: Any, most: Any) -> None:
     """Raise ``WorkLimitError`` if a run exceeds its work limit."""
     if np.any(work > most):
         raise WorkLimitError(
-            f"the run needs more work than {np.min(most):.3g} substeps because contact or "
-            "friction states keep changing. Look for an extreme parameter",
+            f"the run exceeds its limit of {np.min(most):.3g} substeps, because contact or "
+            "friction states keep changing. Look for a parameter with an extreme value",
             name="work",
             value=f"{np.min(most):.3g} substeps",
         )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -37,22 +37,29 @@ class CaseKernel(Protocol):
         Number of cases in a group.
     at_once
         Best number of calling threads.
+    shares_stimuli
+        Whether it reads a stimulus without repetitions, `native.Inputs`.
     """
 
     layout: Layout
     label: str
     lanes: int
     at_once: int
+    shares_stimuli: bool
 
     def rows(self, cases: int, rows: int) -> Array:
         """Return an array for the recorded rows, shape (cases, rows, signals)."""
+        ...
+
+    def array(self, shape: tuple[int, ...]) -> Array:
+        """Return an array that the kernel fills fast; its values are not determined."""
         ...
 
     def advance(
         self,
         schedule: Schedule,
         parameters: Array,
-        stimulus: Array,
+        stimulus: Any,
         vector: Array,
         rows: Array,
         end: int,
@@ -72,6 +79,7 @@ class LaneKernel:
 
     ENTRY = "bw_run_lanes"
     """name of the kernel's function in the library"""
+    shares_stimuli = False
 
     def __init__(
         self, layout: Layout, library: Path, compiler: Compiler, signals: int, ends: int = 0
@@ -110,6 +118,10 @@ class LaneKernel:
     def rows(self, cases: int, rows: int) -> Array:
         """Return an array for the recorded rows; see `CaseKernel`."""
         return np.empty((cases, rows, self._signals))
+
+    def array(self, shape: tuple[int, ...]) -> Array:
+        """Return an uninitialized array; see `CaseKernel`."""
+        return np.empty(shape)
 
     def advance(
         self,
@@ -184,7 +196,7 @@ def case_kernel(
 ) -> CaseKernel:
     """Return the kernel for a number of cases that records the outputs with these indices.
 
-    ``ends``: see `LaneKernel`. Kernels for a graphics processor have no such signals.
+    ``ends``: see `LaneKernel`.
 
     Raises
     ------
@@ -194,19 +206,21 @@ def case_kernel(
     if engine == CUDA:
         from bywire.simulation.cuda import find_device
 
-        return cuda_kernel(prepared, find_device(), selection).for_cases(count, schedule)
+        return cuda_kernel(prepared, find_device(), selection, ends).for_cases(count, schedule)
     compiler = find_compiler()
     assert compiler is not None
     return lane_kernel(prepared, compiler, selection, count >= PAIRED, ends)
 
 
 @built_once
-def cuda_kernel(prepared: Prepared, device: CudaDevice, selection: tuple[int, ...]) -> CudaKernel:
+def cuda_kernel(
+    prepared: Prepared, device: CudaDevice, selection: tuple[int, ...], ends: int = 0
+) -> CudaKernel:
     """Return a graphics processor's kernel for the outputs with these indices; built only once."""
     from bywire.simulation.cuda import CudaKernel
     from bywire.simulation.stages import build_stages
 
-    return CudaKernel(device, build_stages(prepared.program, outputs=selection))
+    return CudaKernel(device, build_stages(prepared.program, outputs=selection), ends)
 
 
 @built_once

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import SolverError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
+from bywire.core.units import shown
 from bywire.simulation.symbols import SX, column, depends, nonlinear, scalars, symbol_tuple
 
 
@@ -258,7 +259,7 @@ def _too_fast(opened: NDArray[np.float64], closed: NDArray[np.float64], step: fl
             swinging = omega[k][swings][0]
             texts[k] = (
                 f"a closed contact oscillates at {swinging / (2 * np.pi):.4g} Hz, too fast for "
-                f"steps of {step * 1e6:g} us, so rebounds may be wrong. Use steps of at most "
-                f"{SAFE / swinging * 1e6:.2g} us, a softer contact, or more damping"
+                f"steps of {shown(step, 's')}, so rebounds may be wrong. Use steps of at most "
+                f"{shown(SAFE / swinging, 's', digits=2)}, a softer contact, or more damping"
             )
     return texts

@@ -14,8 +14,10 @@ import importlib
 import math
 import os
 import threading
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from types import ModuleType
@@ -25,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, DeviceError, ParameterError, quoted
+from bywire.core.interrupts import raise_if_stopped
 from bywire.core.libraries import how_to_install
 from bywire.core.pairs import read_count
 from bywire.core.scratch import scratch_folder
@@ -32,7 +35,7 @@ from bywire.core.typing import Array
 from bywire.simulation.c_runtime import CUDA, ONE_LANE
 from bywire.simulation.compiler import digest_of, is_intact, sha256, usable_folder
 from bywire.simulation.emit_single import Caller, emit_single
-from bywire.simulation.native import Ends, Request, plan_array, pointer
+from bywire.simulation.native import Ends, Inputs, Request, plan_array, pointer
 from bywire.simulation.program import Program
 from bywire.simulation.schedule import Layout, Schedule
 from bywire.simulation.stages import Stages, build_stages, layout_of, leaf_count
@@ -160,7 +163,9 @@ VARIABLE = "BYWIRE_GPU"
 """environment variable that selects one of several graphics processors by number"""
 _NO_DRIVER = "the driver's library is missing"
 _OUT_OF_MEMORY = 2  # CUDA_ERROR_OUT_OF_MEMORY
+_BLOCKING = 4  # CU_CTX_SCHED_BLOCKING_SYNC
 _MEGA = 1e6
+_FLOAT = 8  # bytes
 
 
 class CudaDevice:
@@ -188,6 +193,10 @@ class CudaDevice:
             )
         )
         self._capability = 10 * int(major) + int(minor)
+        # A thread that waits leaves its core to other work. The flag is a wish: another library of
+        # this process may have chosen already.
+        driver.cuDevicePrimaryCtxSetFlags(self._device, _BLOCKING)
+        self._free: list[tuple[int, int]] = []
         self._context = self._checked(driver.cuDevicePrimaryCtxRetain(self._device))
 
     def load(self, source: str, entry: str) -> Any:
@@ -207,6 +216,32 @@ class CudaDevice:
         """Return the number of free bytes."""
         with self._current():
             return int(self._checked(self._driver.cuMemGetInfo())[0])
+
+    def host_array(self, shape: tuple[int, ...]) -> Array:
+        """Return an uninitialized array in page-locked memory, which the device fills directly.
+
+        The system maps new memory page by page, which takes longer than to fill it. So the memory
+        of an array that nothing refers to any more is used again. Memory that cannot be locked is
+        ordinary memory.
+        """
+        size = max(math.prod(shape) * _FLOAT, 8)
+        with self._current():
+            fitting = [each for each in self._free if size <= each[1] <= 2 * size]
+            if fitting:
+                block = min(fitting, key=lambda each: each[1])
+                self._free.remove(block)
+            else:
+                for address, _ in self._free:
+                    self._driver.cuMemFreeHost(address)
+                self._free.clear()
+                status, address = self._driver.cuMemHostAlloc(size, 0)
+                if int(status):
+                    return np.empty(shape)
+                block = int(address), size
+        held = (ctypes.c_byte * block[1]).from_address(block[0])
+        weakref.finalize(held, self._free.append, block).atexit = False
+        memory = memoryview(held)  # keeps it
+        return np.frombuffer(memory, dtype=float, count=math.prod(shape)).reshape(shape)
 
     @contextmanager
     def working(self) -> Iterator[Memory]:
@@ -368,41 +403,55 @@ ENTRY = "bw_run_cases"
 THREADS = 64
 """threads per block; few, because each thread uses as many of the shared registers as possible"""
 
-# After `stages.PLAN`: number of cases, whether each has its own stimulus, the first row of the
-# stimulus in memory, and the distances between the entries of two cases, rows and signals.
-_BEGIN = """const int64_t cases = plan[8 + {tasks}], own = plan[9 + {tasks}];
+# After `stages.PLAN`: number of threads and of recorded cases, the first row of the stimulus in
+# memory, the distances between the entries of two cases, rows and signals, the frames of the first
+# and last rows, and for each number of a stimulus its place, and the distances between its values
+# in two rows and in two cases.
+_NUMBERS = 8
+_BEGIN = """const int64_t cases = plan[8 + {tasks}], used = plan[9 + {tasks}];
   const int64_t ahead = plan[10 + {tasks}], by_case = plan[11 + {tasks}];
   const int64_t by_row = plan[12 + {tasks}], by_signal = plan[13 + {tasks}];
+  const int64_t end0 = plan[14 + {tasks}], end1 = plan[15 + {tasks}];
+  const int64_t *restrict us = plan + 16 + {tasks};
   const int64_t at = (int64_t)blockIdx.x * blockDim.x + threadIdx.x;
   if (at >= cases) return;
-  const int64_t wide = own ? cases : 1;
-  if (own) u += at;
   state += at;
   rec += at * by_case;
   double p[{np} + 1];
   for (int k = 0; k < {np}; ++k) p[k] = par[k * cases + at];
-  (void)wide; (void)chosen;"""
+  (void)chosen; (void)ends; (void)end0; (void)end1; (void)us; (void)used;"""
 
 _THREADS = Caller(
     runtime=ONE_LANE,
     head=f"""KERNEL void __launch_bounds__({THREADS}) {ENTRY}(const double *restrict par, double h,
     const double *restrict u, double *restrict state, const int64_t *restrict plan,
-    double *restrict rec)""",
+    double *restrict rec, double *restrict ends)""",
     begin=_BEGIN,
-    stimulus="uk[{k} * wide]",
+    stimulus="u[us[3 * {k}] + at_row * us[3 * {k} + 1] + at * us[3 * {k} + 2]]",
     entry="state[{k} * cases]",
-    row="u + (f / stim - ahead) * {nu} * wide",
-    record="""double *row = rec + (f / every - row0) * by_row;
-      for (int j = 0; j < {count}; ++j) row[j * by_signal] = o[j];""",
+    row="const int64_t at_row = f / stim - ahead;\n    (void)at_row;",
+    record="",
 )
+_RECORD = """if (at < used) {{{{
+        double *row = rec + (f / every - row0) * by_row;
+        for (int j = 0; j < {rows}; ++j) row[j * by_signal] = o[j];
+        for (int j = {rows}; j < {{count}}; ++j) {{{{
+          double *both = ends + 2 * ((j - {rows}) * used + at);
+          if (f == end0) both[0] = o[j];
+          if (f == end1) both[1] = o[j];
+        }}}}
+      }}}}"""
 
 
-def emit_cuda(stages: Stages) -> str:
+def emit_cuda(stages: Stages, ends: int = 0) -> str:
     """Return the CUDA C source of the kernel.
 
-    It does not include the compiler's prologue, which is ``c_runtime.CUDA`` for NVRTC.
+    It does not include the compiler's prologue, which is ``c_runtime.CUDA`` for NVRTC. ``ends``:
+    number of outputs at the end of the list that the kernel records only in the first and last
+    rows.
     """
-    return emit_single(stages, _THREADS)
+    record = _RECORD.format(rows=len(stages.output) - ends)
+    return emit_single(stages, replace(_THREADS, record=record))
 
 
 # --- The kernel
@@ -411,7 +460,6 @@ MOST = 2**15
 """maximum number of cases in a batch: the number of threads that the largest processors can hold"""
 _SUBSTEPS = 5000  # substeps per time interval
 _SHARE = 0.5  # fraction of the free memory for a batch; thread stacks and other data need the rest
-_FLOAT = 8  # bytes
 
 
 class CudaKernel:
@@ -423,18 +471,23 @@ class CudaKernel:
         The graphics processor.
     stages
         Stages of the kernel for the requested signals.
+    ends
+        Number of signals at the end of the list that the kernel records only in the first and last
+        rows.
     """
 
     at_once = 2
     """number of batches at a time: the host prepares or reads one while the device computes one"""
+    shares_stimuli = True
 
-    def __init__(self, device: CudaDevice, stages: Stages) -> None:
+    def __init__(self, device: CudaDevice, stages: Stages, ends: int = 0) -> None:
         self.layout: Layout = layout_of(stages)
         self.label = f"CUDA C, {device.label}"
         self.lanes = 1
-        self._device, self._signals = device, len(stages.output)
+        self._most = 2**62
+        self._device, self._signals, self.ends = device, len(stages.output) - ends, ends
         self._inputs = leaf_count(stages, "p"), leaf_count(stages, "u")
-        self._function = device.load(emit_cuda(stages), ENTRY)
+        self._function = device.load(emit_cuda(stages, ends), ENTRY)
 
     def for_cases(self, count: int, schedule: Schedule) -> CudaKernel:
         """Return the kernel for batches that fit into memory, of about equal size.
@@ -445,30 +498,37 @@ class CudaKernel:
             When a single case does not fit into memory.
         """
         free = self._device.free()
-        size = self._size(schedule)
-        most = min(MOST, int(_SHARE * free) // size)
+        room = int(_SHARE * free) - _plan_size(schedule, self._inputs[1])
+        size, row = self._size(schedule), _FLOAT * self._signals
+        least = size + row * _most_rows(schedule)
+        most = min(MOST, room // least)
         if most < 1:
             raise DeviceError(
                 f"{self._device.label} has {free / 1e6:.3g} MB free. A case may use half of it, "
-                f"but needs {size / 1e6:.3g} MB. Record fewer signals, or record them less often",
+                f"but needs {least / 1e6:.3g} MB. Record fewer signals, or record them less often",
                 name=self._device.label,
-                value=f"{size / 1e6:.3g} MB",
+                value=f"{least / 1e6:.3g} MB",
                 valid=f"{free / 1e6:.3g} MB free",
             )
         batches = -(-count // most)
         sized = copy.copy(self)
         sized.lanes = -(-count // batches)
+        sized._most = (room // sized.lanes - size) // max(row, 1)
         return sized
 
     def rows(self, cases: int, rows: int) -> Array:
         """Return an array for recorded rows in the device's layout; see `CaseKernel`."""
-        return np.empty((rows, self._signals, cases)).transpose(2, 0, 1)
+        return self.array((rows, self._signals, cases)).transpose(2, 0, 1)
+
+    def array(self, shape: tuple[int, ...]) -> Array:
+        """Return an uninitialized array that the device fills fast; see `CaseKernel`."""
+        return self._device.host_array(shape)
 
     def advance(
         self,
         schedule: Schedule,
         parameters: Array,
-        stimulus: Array,
+        stimulus: Array | Inputs,
         vector: Array,
         rows: Array,
         end: int,
@@ -477,45 +537,105 @@ class CudaKernel:
     ) -> None:
         """Run the frames from begin to end for one batch; see ``case_kernels.LaneKernel.advance``.
 
-        ``ends`` is None, because the kernel records all outputs in all rows.
+        ``stimulus``: rows for all cases, shape (rows, nu), or `Inputs`.
 
         Raises
         ------
         DeviceError
             When the device fails, or other programs have allocated its memory in the meantime.
+        KeyboardInterrupt
+            When the user interrupts the run, or stops it in a thread.
         """
-        own = int(stimulus.ndim == 3)
+        inputs = (
+            stimulus
+            if isinstance(stimulus, Inputs)
+            else Inputs.of(lambda _: stimulus.T, 1, self.lanes)
+        )
+        frames = (-1, -1) if ends is None else ends.frames
         with self._device.working() as memory:
             state, par = memory.room(vector.nbytes), memory.room(parameters.nbytes)
             memory.put(state, vector)
             memory.put(par, parameters)
-            given = memory.room(stimulus[: _stimulus_rows(schedule)].nbytes)
-            plan = memory.room(_FLOAT * (len(schedule.task_frames) + 14))
-            recording = _Recording(rows, self.lanes, _most_rows(schedule))
+            given = _Given(memory, inputs, _stimulus_rows(schedule))
+            plan = memory.room(_plan_size(schedule, self._inputs[1]))
+            pieces = _pieces(schedule, begin, end)
+            counts = [rows_between(schedule, *piece) for piece in pieces]
+            recording = _Recording(rows, self.lanes, min(max(self._most, *counts), sum(counts)))
             room = memory.room(recording.size)
-            for first, last in _pieces(schedule, begin, end):
+            apart = np.empty(0) if ends is None else np.ascontiguousarray(ends.values)
+            edges = memory.room(apart.nbytes)
+            memory.put(edges, apart)
+            for number, (first, last) in enumerate(pieces):
+                raise_if_stopped()
+                if not recording.fits(counts[number]):
+                    recording.fetch(memory, room)
+                if not recording.count:
+                    recording.begin(counts[number:])
                 ahead = first // schedule.stimulus_frames
-                memory.put(given, stimulus[ahead : last // schedule.stimulus_frames + 1])
-                recording.begin(rows_between(schedule, first, last))
+                where = given.rows(ahead, last // schedule.stimulus_frames + 1)
                 numbers = [*plan_array(schedule, first, last, self._signals)]
-                numbers += [self.lanes, own, ahead, *recording.apart]
+                numbers += [self.lanes, len(rows), ahead, *recording.apart, *frames, *where]
                 memory.put(plan, np.array(numbers, dtype=np.int64))
                 memory.run(
                     self._function,
                     -(-self.lanes // THREADS),
                     THREADS,
-                    (par, float(schedule.step), given, state, plan, room),
+                    (
+                        par,
+                        float(schedule.step),
+                        given.place,
+                        state,
+                        plan,
+                        int(room) + recording.offset,
+                        edges,
+                    ),
                 )
-                memory.get(room, recording.place)
-                recording.end()
+                recording.count += counts[number]
+            recording.fetch(memory, room)
             memory.get(state, vector)
+            if ends is not None:
+                memory.get(edges, apart)
+                ends.values[:] = apart
 
     def _size(self, schedule: Schedule) -> int:
-        """Return the size in bytes of a case with its own stimulus."""
+        """Return the size in bytes of a case with its own stimulus, without recorded rows."""
         parameters, inputs = self._inputs
         stimulus = inputs * _stimulus_rows(schedule)
-        recorded = self._signals * _most_rows(schedule)
-        return _FLOAT * (parameters + self.layout.total + stimulus + recorded)
+        return _FLOAT * (parameters + self.layout.total + stimulus + 2 * self.ends)
+
+
+def _plan_size(schedule: Schedule, inputs: int) -> int:
+    """Return the size of a kernel's plan in bytes."""
+    return _FLOAT * (8 + len(schedule.task_frames) + _NUMBERS + 3 * inputs)
+
+
+class _Given:
+    """The stimulus of a batch on the device, a time interval at a time.
+
+    Parameters
+    ----------
+    memory, inputs
+        The device's memory, and the stimulus.
+    most
+        Maximum number of rows in an interval.
+    """
+
+    def __init__(self, memory: Memory, inputs: Inputs, most: int) -> None:
+        self._memory, self._inputs = memory, inputs
+        size = sum(len(each) * min(each.shape[1], most) for each in inputs.values)
+        self.place = memory.room(_FLOAT * size)
+
+    def rows(self, begin: int, end: int) -> list[int]:
+        """Copy the rows from begin to end, and return the place and distances of each number."""
+        parts = [each[:, begin:end] if each.shape[1] > 1 else each for each in self._inputs.values]
+        if parts:
+            self._memory.put(self.place, np.concatenate([part.ravel() for part in parts]))
+        where, start = [], 0
+        for part, each in zip(parts, self._inputs.values, strict=True):
+            by_row = int(each.shape[1] > 1)
+            where += [start, by_row, part.shape[1] if len(part) > 1 else 0]
+            start += part.size
+        return where
 
 
 def _frames(schedule: Schedule) -> int:
@@ -524,36 +644,58 @@ def _frames(schedule: Schedule) -> int:
 
 
 class _Recording:
-    """Destination of the rows of a time interval, in the order of the caller's array.
+    """Destination of the rows of several time intervals, in the order of the caller's array.
 
-    The rows go directly into the caller's array if the interval fills all of it. Otherwise, they go
-    through a buffer.
+    The rows go directly into the caller's array if they fill all of it. Otherwise, they go through
+    a buffer.
+
+    Parameters
+    ----------
+    rows
+        The caller's array; see `CudaKernel.advance`.
+    lanes
+        Number of threads.
+    most
+        Maximum number of rows on the device.
     """
 
     def __init__(self, rows: Array, lanes: int, most: int) -> None:
-        self._rows, self._lanes, self._at = rows, lanes, 0
+        self._rows, self._most, self._at, self.count = rows, most, 0, 0
         self._order = sorted(range(3), key=lambda axis: -rows.strides[axis])
-        self._room = np.empty(lanes * most * rows.shape[2])
-        self.size = self._room.nbytes
-        self.begin(0)
+        self.size = _FLOAT * len(rows) * most * rows.shape[2]
+        self.begin([0])
 
-    def begin(self, count: int) -> None:
-        """Prepare the destination of more rows."""
-        shape = self._lanes, count, self._rows.shape[2]
-        self._target = self._rows[:, self._at : self._at + count]
-        own = self._room[: math.prod(shape)].reshape([shape[axis] for axis in self._order])
-        straight = self._target.transpose(self._order)
-        is_whole = straight.shape == own.shape and straight.flags.c_contiguous
-        self.place = straight if is_whole else own
-        seen = self.place.transpose(np.argsort(self._order))
-        self._seen = None if is_whole else seen
-        self.apart = [stride // _FLOAT for stride in seen.strides]
-        self._at += count
+    @property
+    def offset(self) -> int:
+        """Place of the next row on the device, from the first one [byte]."""
+        return _FLOAT * self.apart[1] * self.count
 
-    def end(self) -> None:
+    def fits(self, count: int) -> bool:
+        """Return whether there is room for so many more rows."""
+        return self.count + count <= self._planned
+
+    def begin(self, counts: Sequence[int]) -> None:
+        """Prepare the destination of the rows of the next intervals, as many as there is room."""
+        totals = np.cumsum(counts)
+        self._planned = int(totals[totals <= self._most].max(initial=counts[0]))
+        shape = len(self._rows), self._planned, self._rows.shape[2]
+        target = self._rows[:, self._at : self._at + self._planned].transpose(self._order)
+        self._target, self._is_whole = target, target.flags.c_contiguous
+        if self._is_whole:
+            self._place = target
+        else:
+            self._place = np.empty([shape[axis] for axis in self._order])
+        strides = self._place.transpose(np.argsort(self._order)).strides
+        self.apart = [stride // _FLOAT for stride in strides]
+
+    def fetch(self, memory: Memory, room: Any) -> None:
         """Copy the rows into the caller's array."""
-        if self._seen is not None:
-            self._target[:] = self._seen[: len(self._target)]
+        if self.count:
+            memory.get(room, self._place)
+            if not self._is_whole:
+                self._target[:] = self._place
+        self._at += self.count
+        self.count = 0
 
 
 def rows_between(schedule: Schedule, begin: int, end: int) -> int:

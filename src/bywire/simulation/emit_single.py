@@ -54,9 +54,9 @@ class Caller:
     begin
         Statements after the plan, which store the parameters in ``p``.
     stimulus, entry
-        Format strings for number ``k`` of a stimulus row ``uk`` and of the state vector.
+        Format strings for number ``k`` of a stimulus row and of the state vector.
     row
-        Start of the stimulus row; ``nu``: its length.
+        Statements that find the stimulus row of a frame ``f``; ``nu``: its length.
     record
         Statements that record the outputs ``o``; ``count``: their number.
     pause, end
@@ -81,7 +81,7 @@ EXPORTED = Caller(
     begin="",
     stimulus="uk[{k}]",
     entry="state[{k}]",
-    row="u + (f / stim) * {nu}",
+    row="const double *restrict uk = u + (f / stim) * {nu};\n    (void)uk;",
     record="""double *row = rec + (f / every - row0) * chosen;
       for (int64_t j = 0; j < chosen; ++j) row[j] = o[selection[j]];""",
 )
@@ -192,8 +192,7 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
   int64_t f = begin;
   for (; f < end + last; ++f) {{
     {caller.pause}
-    const double *restrict uk = {caller.row.format(**parts)};
-    (void)uk;
+    {caller.row.format(**parts)}
     {indented(ticks, 4)}
     if (f % every == 0) {{
       double o[{max(len(stages.output), 1)}];

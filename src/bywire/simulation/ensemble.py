@@ -32,7 +32,7 @@ from bywire.simulation.advance import (
 )
 from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
 from bywire.simulation.engine import CUDA, are_alike, prepare
-from bywire.simulation.native import Ends
+from bywire.simulation.native import Ends, Inputs
 from bywire.simulation.run import (
     Run,
     Trajectory,
@@ -50,6 +50,9 @@ from bywire.simulation.schedule import COUNTERS, Schedule
 # intervals, the run reports progress and handles interrupts, which takes as long as a hundred
 # substeps.
 _CHUNKS, _SUBSTEPS = 20, 20_000
+# A graphics processor fetches the rows of an interval at its end, and checks for interrupts more
+# often.
+_CUDA_SUBSTEPS = 200_000
 
 
 def fit_lanes(runs: Sequence[Run], engine: str = "auto") -> bool:
@@ -161,8 +164,8 @@ def simulate_group(
     engine
         ``auto`` and ``compiled`` compute the runs in lanes, ``cuda`` on a graphics processor.
     ends
-        Additional outputs to record only in the first and last rows. This requires runs in lanes
-        without changes.
+        Additional outputs to record only in the first and last rows. This requires runs without
+        changes.
 
     Raises
     ------
@@ -188,21 +191,21 @@ def simulate_group(
     prepared = prepare(runs[0].model, runs[0].par)
     names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
-    if ends and (engine == CUDA or any(run.changes for run in runs)):
+    if ends and any(run.changes for run in runs):
         raise ParameterError(
-            "ends is not available for runs with changes or on a graphics processor, which record "
-            "all rows. Omit ends",
+            "ends is not available for runs with changes, which record all rows. Omit ends",
             name="ends",
         )
     selection = tuple(selected(names, (*wanted, *ends)).tolist())
     schedule = runs[0].schedule()
     kernel = case_kernel(prepared, engine, selection, len(runs), schedule, len(ends))
-    edges = _edges(schedule, first, runs)
+    edges = _edges(schedule, first, runs, _CUDA_SUBSTEPS if engine == CUDA else _SUBSTEPS)
     output = runs[0].model.Output
     jumping = energies(output, wanted) if any(run.changes for run in runs) else np.empty((0, 0))
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
     recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
-    values = np.zeros((len(recorded), len(runs), schedule.rows - first))
+    values = kernel.array((len(recorded), len(runs), schedule.rows - first))
+    values[len(wanted) :] = 0.0  # sums up the work of changes
     at_ends = np.zeros((len(ends), len(runs), 2))
     frames = (first * schedule.record_frames, (schedule.rows - 1) * schedule.record_frames)
 
@@ -227,13 +230,14 @@ def simulate_group(
     )
 
 
-def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
+def _edges(schedule: Schedule, first: int, runs: Sequence[Run], least: int) -> list[int]:
     """Return the frames at which the intervals of a run begin and end.
 
-    They include the frame of the first recorded row and those of the runs' changes.
+    They include the frame of the first recorded row and those of the runs' changes. ``least``:
+    minimum number of substeps per interval.
     """
     every = schedule.record_frames
-    count = min(_CHUNKS, schedule.frames * schedule.substeps // _SUBSTEPS + 1)
+    count = min(_CHUNKS, schedule.frames * schedule.substeps // least + 1)
     rows = {*np.linspace(0, schedule.frames // every, count + 1).astype(int).tolist(), first}
     changed = (pieces(run.par, run.changes, schedule) for run in runs if run.changes)
     begins = {begin for stretches in changed for begin, _, _ in stretches}
@@ -254,20 +258,36 @@ class _Watch:
                 self._progress(self._done / self._pieces)
 
 
-def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
-    """Return the runs' stimulus rows, shape (rows, nu, width), or (rows, nu) if all are equal."""
-    t = schedule.stimulus_times
-    signals = np.zeros((width, len(group[0].model.Stimulus._fields), t.size))  # each contiguous
+def _stimuli(group: Sequence[Run], schedule: Schedule, kernel: CaseKernel) -> Array | Inputs:
+    """Return the runs' stimulus rows as a kernel reads them.
+
+    For lanes, the shape is (rows, nu, lanes), or (rows, nu) if all are equal.
+    """
+    t, ranges = schedule.stimulus_times, stimulus_ranges(group[0].model)
+    shape, width = (len(group[0].model.Stimulus._fields), t.size), kernel.lanes
+
+    def require_usual(signals: Array, runs: Sequence[Run]) -> None:
+        is_usual = np.isfinite(signals).all() and all(
+            (signals[:, k] >= low).all() and (signals[:, k] <= high).all()
+            for k, low, high in ranges
+        )
+        if not is_usual:
+            for run in runs:
+                sampled_stimulus(run, schedule)  # raises an error with the signal and the time
+
+    def rows_of(case: int) -> Array:
+        signals = np.zeros(shape)
+        put_into(signals.T, group[case], t)
+        require_usual(signals[None], group[case : case + 1])
+        return signals
+
+    if kernel.shares_stimuli:
+        return Inputs.of(rows_of, len(group), width)
+    signals = np.zeros((width, *shape))  # each contiguous
     for lane, run in enumerate(group):
         put_into(signals[lane].T, run, t)
     signals[len(group) :] = signals[len(group) - 1]
-    is_usual = np.isfinite(signals).all() and all(
-        (signals[:, k] >= low).all() and (signals[:, k] <= high).all()
-        for k, low, high in stimulus_ranges(group[0].model)
-    )
-    if not is_usual:
-        for run in group:
-            sampled_stimulus(run, schedule)  # raises an error with the signal and the time
+    require_usual(signals, group)
     is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
     return (signals[0].T if is_shared else signals.transpose(2, 1, 0)).copy()
 
@@ -292,7 +312,7 @@ class _Carried:
         for lane, run in enumerate(filled):
             for begin, _, par in pieces(run.par, run.changes, schedule) if run.changes else ():
                 self._changes.setdefault(begin, []).append((lane, par))
-        self._stimulus = _stimuli(group, schedule, width)
+        self._stimulus = _stimuli(group, schedule, kernel)
         self._most = np.array([run.most_work for run in filled])
 
     def to_the_end(

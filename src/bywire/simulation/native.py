@@ -63,6 +63,56 @@ class Ends:
     frames: tuple[int, int]
 
 
+@dataclass(frozen=True)
+class Inputs:
+    """Stimulus of several cases, without repetitions.
+
+    Parameters
+    ----------
+    values
+        Values of each number of a stimulus row, shape (cases, rows). The first dimension is 1 if
+        all cases have equal values, and the second one is 1 if the values do not change.
+    """
+
+    values: tuple[Array, ...]
+
+    @classmethod
+    def of(cls, rows_of: Callable[[int], Array], cases: int, lanes: int) -> Inputs:
+        """Return the stimulus of some cases; idle lanes repeat the last case.
+
+        ``rows_of(case)``: its stimulus, shape (nu, rows), computed anew for each call.
+        """
+        first = rows_of(0)
+        bits = first.view(np.int64)
+        is_shared, is_constant = np.ones((2, len(first)), dtype=bool)
+        starts = np.empty((len(first), lanes))
+        own, apart = np.arange(0), np.empty((0, lanes, first.shape[1]))
+        for case in range(cases):
+            each = rows_of(case) if case else first
+            own_bits = each.view(np.int64)  # also tell the two zeros apart
+            is_shared &= (own_bits == bits).all(axis=1)
+            is_constant &= (own_bits == own_bits[:, :1]).all(axis=1)
+            starts[:, case] = each[:, 0]
+            if case == 1:  # usually, these are the numbers that differ in all cases
+                own = np.flatnonzero(~is_shared & ~is_constant)
+                apart = np.empty((len(own), lanes, first.shape[1]))
+                apart[:, 0] = first[own]
+            apart[:, case] = each[own]
+        starts[:, cases:] = starts[:, cases - 1 : cases]
+        apart[:, cases:] = apart[:, cases - 1 : cases]
+        every = np.flatnonzero(~is_shared & ~is_constant)
+        if len(every) > len(own):
+            own, apart = every, np.empty((len(every), lanes, first.shape[1]))
+            for lane in range(lanes):
+                apart[:, lane] = rows_of(min(lane, cases - 1))[own]
+        values = [
+            first[k : k + 1] if is_shared[k] else starts[k][:, None] for k in range(len(first))
+        ]
+        for k, rows in zip(own.tolist(), apart, strict=True):
+            values[k] = rows
+        return cls(tuple(values))
+
+
 def plan_array(schedule: Schedule, begin: int, end: int, selected: int) -> NDArray[np.int64]:
     """Return the kernel's plan for the frames from begin to end, with the row at the run's end."""
     return np.array(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import StepError, not_valid
+from bywire.core.units import shown, written_unit
 
 _TOLERANCE = 1e-9
 _REST = 1e-6  # maximum deviation of an interval from whole steps, relative to a step
@@ -134,10 +135,11 @@ def _divided(frame: int) -> int:
 def _require_few(name: str, length: float, step: float) -> None:
     if length / step > _MOST:
         raise StepError(
-            f"step = {step * 1e6:g} us is too short for the {name} interval of {length:g} s, which "
-            f"would contain more than {_MOST:.2g} steps. Use a shorter interval",
+            f"step = {shown(step, 's')} is too short for the {name} interval of "
+            f"{shown(length, 's')}, which would contain more than {_MOST:.2g} steps. Use a shorter "
+            "interval",
             name="step",
-            value=f"{step * 1e6:g} us",
+            value=shown(step, "s"),
             valid=f"{_MOST:.2g} steps",
         )
 
@@ -148,18 +150,22 @@ def _whole(period: float, step: float, name: str) -> int:
     rest = abs(count * step - period)
     rounding = _REST * step + 4.0 * math.ulp(period)
     if count < 1 or rest > min(_TOLERANCE * period, rounding):
+        # The error uses the unit in which the user wrote the step or the interval.
+        texts = (getattr(each, "text", "") for each in (step, period))
+        unit = next(filter(None, (written_unit(text, "s") for text in texts)), "")
+        value, valid = shown(step, "s", unit), shown(_divisor(period, step), "s", unit, digits=15)
         raise StepError(
-            f"step = {step * 1e6:g} us does not divide the {name} interval of "
-            f"{period * 1e6:.12g} us. For example, use {_divisor(period, step):.16g} us",
+            f"step = {value} does not divide the {name} interval of "
+            f"{shown(period, 's', unit, digits=12)}. For example, use {valid}",
             name="step",
-            value=f"{step * 1e6:g} us",
-            valid=f"{_divisor(period, step):.16g} us",
+            value=value,
+            valid=valid,
         )
     return count
 
 
 def _divisor(period: float, step: float) -> float:
-    """Return a step [us] with few digits that divides a period and is not longer than a step.
+    """Return a step [s] with few digits that divides a period and is not longer than a step.
 
     If possible, the result is a whole number of nanoseconds, which divides a period of whole
     nanoseconds.
@@ -174,24 +180,24 @@ def _divisor(period: float, step: float) -> float:
             shorter = (int(whole / count) for count in counts if whole % count == 0)
         for each in shorter:
             if whole % each == 0:
-                return each * 1e-3
-    return period / least * 1e6
+                return each / 1e9
+    return period / least
 
 
 # --- The state vector
 
 COUNTERS = 3  # at the end of the state vector, see `Layout`
-CAP = 8  # passes through one substep before it counts as unsettled
+CAP = 8  # passes through one substep before it is treated as unsettled
 JUMP, FLAG, DOUBT = 4, 5, 6  # indices among the results of a pass, after x, d, r, q
 # Search for the time at which a substep is cut: maximum number of attempts; remaining velocity at
 # which the search ends, or is close enough for linear interpolation, relative to the substep's
 # change of velocity; and minimum fraction of a part before and after the cut.
 ATTEMPTS, CLOSE, NEAR, EDGE = 12, 1e-12, 1e-9, 1e-9
-STILL = 1e-9  # fraction of its initial value below which another velocity also counts as zero
+STILL = 1e-9  # fraction of its initial value below which another velocity is also treated as zero
 
 
 def most_cuts(velocities: int) -> int:
-    """Return the number of parts after which a substep counts as unsettled.
+    """Return the number of parts after which a substep is treated as unsettled.
 
     Each velocity with dry friction may reverse, and may reverse again after other velocities have
     reversed.

@@ -29,7 +29,7 @@ from bywire.simulation.symbols import SX, column, depends, nonlinear, scalars, s
 NEVER = 1e30  # exceeds every misfit
 NOTHING = 1e-318  # rounds a misfit below 1e-6 to exactly zero
 FITTING = 1e-12  # misfit, relative to a row's scale, below which guessed signs are accepted
-RESIDUAL = 1e-9  # misfit, relative to a row's scale, above which a projection counts as failed
+RESIDUAL = 1e-9  # misfit, relative to a row's scale, above which a projection is treated as failed
 
 
 @dataclass(frozen=True)
@@ -156,8 +156,8 @@ def _exact(m: int) -> Any:
         better = misfit < best_misfit
         best = ca.if_else(better, w, best)
         best_misfit = ca.if_else(better, misfit, best_misfit)
-    # NaN forces must not count as rest, but compilers may compare NaN incorrectly. For NaN forces,
-    # the misfit of the chosen combination is NaN. Otherwise, it adds exactly zero.
+    # NaN forces must not be treated as rest, but compilers may compare NaN incorrectly. For NaN
+    # forces, the misfit of the chosen combination is NaN. Otherwise, it adds exactly zero.
     best = best + _misfit(S, c, low, high, best) * NOTHING
     results = [best, _within(S @ best - c, low, high), best_misfit > RESIDUAL]
     return ca.Function("exact_projection", [S, c, low, high], results)
@@ -693,7 +693,7 @@ def _stops(
     places = [_index(model, name) for name in model.stops]
     if depends(gaps(s.x, s.x), ca.vertcat(*(s.x[k] for k in places))):
         raise ModelError(
-            f"{model.name}: overlaps of contacts depend on stop operators: use other states",
+            f"{model.name}: overlaps of contacts depend on stop operators. Use other states",
             name="gap",
             value=", ".join(model.stops),
             valid="overlaps without stop operators",

@@ -91,7 +91,7 @@ class _Balance:
     def _split(self, node: Node) -> tuple[int, Node, Node] | None:
         """Return a rarely changing factor and the rest of a product, if nothing else needs it.
 
-        The factors a - b and b - a count as the same factor with opposite sign.
+        The factors a - b and b - a are treated as the same factor with opposite sign.
         """
         nodes, level = self._graph.nodes, self._level
         if nodes[node].op != "mul" or level[node] < 2 or self._uses[node] > 1:

@@ -203,7 +203,7 @@ def ranked(values: Array) -> Array:
 # Ranges and tolerances are also distributions; a grid and a worst-case search use their ends.
 
 NEVER = 1e-9
-"""probability of invalid values that counts as zero"""
+"""probability of invalid values that is treated as zero"""
 TAIL = 0.5 * math.erfc(3.0 / math.sqrt(2.0))
 """probability beyond 3 standard deviations, where a grid ends for an unbounded distribution"""
 
@@ -448,7 +448,7 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
     """Return a distribution that stays within the valid range of its number.
 
     An end that misses a limit only by rounding is moved to it. A distribution that is truncated at
-    an open limit (``> 0``) counts as unbounded there, so that designs that visit the ends stay
+    an open limit (``> 0``) is treated as unbounded there, so that designs that visit the ends stay
     within the limit.
 
     Parameters
@@ -784,11 +784,11 @@ def _normal(entry: _Entry) -> Distribution:
 def _lognormal(entry: _Entry) -> Distribution:
     median = entry.level("median", entry.nominal)
     if not median > 0.0:
-        raise entry.refused(f"the median {entry.amount(median)} must be above zero")
+        raise entry.refused(f"the median {entry.amount(median)} must be > 0")
     variation = entry.width("sd", median) / median
     sigma = math.sqrt(math.log1p(variation**2))
     text = f"log-normal, median {entry.amount(median)}, sd {100.0 * variation:.3g} %"
-    return _frozen(entry, LogNormal(sigma, median), text)  # zero counts as unbounded
+    return _frozen(entry, LogNormal(sigma, median), text)  # zero is treated as unbounded
 
 
 def _triangular(entry: _Entry) -> Distribution:

@@ -96,6 +96,13 @@ class Executor(Protocol):
         ...
 
 
+def batched(chunks: _Chunks, size: int) -> Iterator[list[int | PlacedChunk]]:
+    """Yield batches of chunks."""
+    left = iter(chunks)
+    while several := list(islice(left, size)):
+        yield several
+
+
 def single(chunk: int | PlacedChunk, plan: StudyPlan) -> tuple[int, Columns]:
     """Return the number and the columns of a chunk, computed on one core."""
     return number_of(chunk), computed_chunk(plan, chunk, threads=1)
@@ -245,10 +252,16 @@ class _InPool:
 
     pool: ProcessPoolExecutor
     ahead: int
+    together: int
 
     def __call__(self, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
-        begun = as_completed(self.pool, _computed, chunks, self.ahead)
-        return (computed for _, computed in begun)
+        if self.together == 1:
+            begun = as_completed(self.pool, _computed, chunks, self.ahead)
+            return (computed for _, computed in begun)
+        batches = as_completed(
+            self.pool, _computed_together, batched(chunks, self.together), self.ahead
+        )
+        return (computed for _, batch in batches for computed in batch)
 
     def beside(self, job: Callable[[], T]) -> Beside[T]:
         return Beside(self.pool.submit(_told, job))
@@ -267,8 +280,7 @@ class InProcess:
         self.together = together
 
     def _computed(self, plan: StudyPlan, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
-        left = iter(chunks)
-        while several := list(islice(left, self.together)):
+        for several in batched(chunks, self.together):
             yield from computed_chunks(plan, several)
 
     @contextmanager
@@ -284,17 +296,20 @@ class Pool:
     ----------
     workers
         Number of processes, >= 1.
+    together
+        Number of chunks per batch, more than 1 for a graphics processor, which the processes share:
+        while it computes the batch of one process, the others prepare and judge cases.
     """
 
-    def __init__(self, workers: int) -> None:
-        self.workers = workers
+    def __init__(self, workers: int, together: int = 1) -> None:
+        self.workers, self.together = workers, together
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return the computation; see `Executor`."""
         fewer = f"resume it with fewer {option('workers')}"
         with processes_with_brakes(self.workers, fewer, _give, plan) as pool:
-            yield _InPool(pool, _AHEAD * self.workers)
+            yield _InPool(pool, _AHEAD * self.workers, self.together)
 
 
 def executor_of(
@@ -317,7 +332,7 @@ def executor_of(
     together
         Maximum number of chunks per batch. Default: all.
     engine
-        Engine of the bench: a graphics processor computes many chunks per batch, from one process.
+        Engine of the bench. A graphics processor computes many chunks per batch.
 
     Raises
     ------
@@ -325,13 +340,12 @@ def executor_of(
         As `require_workers`.
     """
     require_workers(workers, cluster, engine)
-    if engine == CUDA:
-        return InProcess(_TOGETHER)
     if cluster:
         return Cluster(cluster)
     count = worker_count(workers, together or chunks)
     is_worth = workers is not None or chunks >= (_WORTH_COPIES if may_copy() else _WORTH)
-    return Pool(count) if count > 1 and is_worth else InProcess()
+    batch = min(_TOGETHER, -(-(together or chunks) // count)) if engine == CUDA else 1
+    return Pool(count, batch) if count > 1 and is_worth else InProcess(batch)
 
 
 def require_workers(workers: int | None, cluster: str, engine: str) -> None:
@@ -340,16 +354,16 @@ def require_workers(workers: int | None, cluster: str, engine: str) -> None:
     Raises
     ------
     ParameterError
-        For zero or too many workers, for workers together with a cluster, and for either of them
-        with a graphics processor.
+        For zero or too many workers, and for a cluster together with workers or a graphics
+        processor.
     """
     if workers is not None:
         whole_number("workers", workers, 1, _MOST_WORKERS)
-    if engine == CUDA and (workers is not None or cluster):
+    if engine == CUDA and cluster:
         raise ParameterError(
             "engine = 'cuda' computes all cases on one graphics processor. Remove "
-            f"{option('cluster' if cluster else 'workers')}",
-            name=option("cluster" if cluster else "workers"),
+            f"{option('cluster')}",
+            name=option("cluster"),
         )
     if cluster and workers is not None:
         raise ParameterError(
@@ -376,3 +390,7 @@ def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
 
 def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
     return single(chunk, _given[0])
+
+
+def _computed_together(chunks: Sequence[int | PlacedChunk]) -> list[tuple[int, Columns]]:
+    return computed_chunks(_given[0], chunks, threads=1)

@@ -9,6 +9,7 @@ from functools import partial
 
 from bywire.bench import running
 from bywire.bench.running import Result
+from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.typing import Progress
 from bywire.simulation.cuda import find_device
 from bywire.simulation.engine import CUDA
@@ -33,6 +34,24 @@ class Completed:
 
     nominal: Result
     damaged: int
+
+
+def _require_device() -> None:
+    """Fail if there is no graphics processor.
+
+    A copy of this process looks for it if workers will be copies too, because copies of a process
+    that has used the driver cannot use it.
+    """
+    if not may_copy():
+        find_device()
+        return
+    with processes_with_brakes(1, "check the driver") as pool:
+        pool.submit(find_device_name).result()
+
+
+def find_device_name() -> str:
+    """Return the name of the graphics processor, which workers can send."""
+    return str(find_device().label)
 
 
 def complete(
@@ -79,7 +98,7 @@ def complete(
     until = time.monotonic() + plan.time
     require_workers(workers, cluster, plan.bench.engine)
     if plan.bench.engine == CUDA:
-        find_device()  # fails here, before the folder is created
+        _require_device()  # fails here, before the folder is created
     store.open(plan, origin)
     damaged = store.drop_damaged()
     itself = partial(running.run, plan.bench, estimate_error=True)

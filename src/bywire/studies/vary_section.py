@@ -40,7 +40,7 @@ _ESTIMATE = "estimate.json"
 """file with the estimates in an identification's folder"""
 _LARGEST = 20_000_000  # maximum size of the file in bytes
 _TRUNCATE = "Truncate the distribution with truncate = true"
-_WEAK = 1e-9  # correlation that counts as zero
+_WEAK = 1e-9  # correlation that is treated as zero
 
 
 class MeasuredSection(Section):
@@ -189,7 +189,7 @@ def _estimates(groups: Mapping[str, Any]) -> Iterator[Measured]:
         values = {str(name): _number(row["value"]) for name, row in rows.items()}
         deviations = {str(name): _number(row["standard_deviation"]) for name, row in rows.items()}
         if not all(d > 0.0 for d in deviations.values()):
-            raise ValueError("a standard deviation is not above zero")
+            raise ValueError("a standard deviation is not > 0")
         names = [str(name) for name in each["correlation"]["names"]]
         matrix = np.array(each["correlation"]["matrix"], dtype=float)
         if matrix.shape != (len(names), len(names)) or {*names} != {*values}:

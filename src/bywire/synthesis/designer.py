@@ -55,7 +55,7 @@ def suffixed(progress: Progress | None, text: str) -> Progress | None:
 
 UNSTABLE = -12.0
 """slack of an unstable loop, before subtracting its growth"""
-_LEAST, _LARGEST = -10.0, 3.0  # range of slacks that count as different
+_LEAST, _LARGEST = -10.0, 3.0  # range of slacks that are treated as different
 KEPT_MISSED = -1e3
 """below this slack, no point of a search meets the requirements to keep"""
 _STEP = 1e-5  # of differences, as a fraction of a range

@@ -32,10 +32,10 @@ from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
 
 _ZERO = 1e-3
-"""Value that counts as zero if the limit is zero; all figures that can be zero are in %."""
+"""Value that is treated as zero if the limit is zero; all figures that can be zero are in %."""
 
 STEADY = 0.05
-"""Steady-state error that counts as zero if zero is required [%], since converters round."""
+"""Steady-state error that is treated as zero if zero is required [%], since converters round."""
 
 _BY_WORD: Mapping[str, LoopFigure] = {
     **{figure.margin: figure for figure in LOOP_FIGURES.values() if figure.margin},

@@ -15,7 +15,7 @@ from bywire.synthesis.linear_case import LinearCase, room, share_left, values_of
 
 Status = Literal["met", "infeasible", "interrupted"]
 MISSED = -1e-3
-"""slack below which a requirement counts as missed, as a fraction of the limit"""
+"""slack below which a requirement is treated as missed, as a fraction of the limit"""
 ROOMY = 0.05
 """slack above which a requirement is not binding"""
 

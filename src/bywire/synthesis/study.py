@@ -205,7 +205,7 @@ def edge_warnings(
     ends
         Ends of the range.
     within
-        Relative distance from an end that counts as equal.
+        Relative distance from an end that is treated as equal.
     """
     return tuple(
         f"the optimum is at the limit {name} = {shown(end, unit)}. Widen the range of {name}"

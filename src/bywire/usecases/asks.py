@@ -65,7 +65,7 @@ ErrorEstimate = Annotated[
 ]
 LastBenchChanges = Annotated[Mapping[str, str], replace(BENCH_CHANGES, is_last=True)]
 NeededCase = Annotated[
-    str, Ask("Run of the experiment. Required if the experiment has more than one.", "Run")
+    str, Ask("Run of the experiment. Required if the experiment has several runs.", "Run")
 ]
 CaseName = Annotated[str, Ask("Run of the experiment. Default: the first.", "Run")]
 OUT = Ask("Folder for recordings, figures and the report.", is_folder=True)

@@ -95,9 +95,11 @@ LoopOrPlant = Annotated[
     str, Ask("Loop or plant (see 'bywire list').", "Loop", name="loop", known=("loops", "plants"))
 ]
 LocusRange = Annotated[
-    str, Ask("Range of a root locus, e.g. motor.R_m=0.1ohm:1ohm:71.", "Root locus")
+    str, Ask("Parameter range of a root locus, e.g. motor.R_m=0.1ohm:1ohm:71.", "Root locus")
 ]
-Reduce = Annotated[str, Ask("Order (e.g. 4) or band (e.g. '150 Hz') of a reduced model.", "Reduce")]
+Reduce = Annotated[
+    str, Ask("Order (e.g. 4) or frequency band (e.g. '150 Hz') of a reduced model.", "Reduce")
+]
 FrictionKind = Annotated[
     str,
     Ask(
@@ -320,7 +322,7 @@ def frequency_response(
 
 _AGREEMENT_POINTS = 6
 TwoAmplitudes = Annotated[
-    str, Ask("Small and large amplitude, e.g. '0.001 rad, 1 rad'.", "Amplitudes")
+    str, Ask("Small and large amplitudes, e.g. '0.001 rad, 1 rad'.", "Amplitudes")
 ]
 
 
@@ -342,7 +344,7 @@ def _agreement_case(
 
 
 @use_case(
-    Command("agreement", status_1="if the causes do not add up"),
+    Command("agreement", status_1="if the contributions of the causes do not add up"),
     form=Form("Nonlinearity of a loop", "Measure", "loop"),
     check=_agreement_case,
 )

@@ -148,7 +148,9 @@ def replay(
         If an argument is invalid, or the measurement cannot be used.
     """
     from bywire.api.replay import Replay, columns_of_bench, driven_bench, stretches_of, units_of
+    from bywire.core.signals import signals_of
     from bywire.core.typing import silent
+    from bywire.data.named_columns import reject_swapped
     from bywire.identification import bench_replay, tracking
     from bywire.identification.bench_replay import case_of
     from bywire.identification.measured import measured, name_of
@@ -158,7 +160,10 @@ def replay(
     driven = driven_bench(bench, overrides)
     limits = read_tolerances(tolerances)
     columns = {n: c for n, c in outputs.items() if c} if isinstance(outputs, Mapping) else {}
-    units = units_of(case_of(driven, case).model, inputs, outputs)
+    model = case_of(driven, case).model
+    reject_swapped("inputs", inputs, signals_of(model.Stimulus))
+    reject_swapped("outputs", columns, signals_of(model.Output))
+    units = units_of(model, inputs, outputs)
     named = columns_of_bench(inputs, columns, time, units)
     read = measured([measurement], mapping, gaps=True, named=named, progress=shown)
     shown("replay", 0.0)

@@ -374,7 +374,7 @@ def study(
     *,
     progress: "Progress | None" = None,
 ) -> "StudyResult":
-    """Compare brake designs under the same demands to find the best, its limits and its cost.
+    """Compare brake designs under the same demands to find the best one, its limits and its cost.
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ from bywire.vehicle.corner import (
     rolling_states,
     warm_disc,
 )
+from bywire.vehicle.ideal_stop import ideal_corner_distance
 from bywire.vehicle.regeneration import RegeneratingCorner, RegeneratingTwoWheeler
 from bywire.vehicle.two_wheeler import (
     HotBrakes,
@@ -34,6 +35,7 @@ __all__ = [
     "WheelSpeed",
     "blended_stop",
     "cold_start",
+    "ideal_corner_distance",
     "regeneration",
     "rolling_start",
     "rolling_states",

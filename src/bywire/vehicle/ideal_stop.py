@@ -11,6 +11,7 @@ from pydantic import Field
 from bywire.core.quantities import Unit
 from bywire.plant import adhesion, road, traction_battery, wheel_motor
 from bywire.vehicle import regeneration
+from bywire.vehicle.corner import CornerParameters
 from bywire.vehicle.two_wheeler import VehicleParameters
 
 _SPEEDS = 4001
@@ -65,6 +66,20 @@ def ideal_distance(v: float, par: VehicleParameters, *, front_only: bool = False
         return math.inf
     k = 0.5 * body.rho * body.CdA / body.m
     return math.log1p(k * v * v / a) / (2.0 * k) if k > 0 else v * v / (2.0 * a)
+
+
+def ideal_corner_distance(v: float, par: CornerParameters) -> float:
+    r"""Return the shortest stopping distance of a quarter car from a speed [m/s], in m.
+
+    .. math:: x = \frac{v^2}{2 g (\mu^* \cos\gamma + \sin\gamma)}
+
+    The tire is at its peak adhesion from the demand on. The distance is infinite if the tire cannot
+    hold the car on the slope.
+    """
+    ground, slope = road.surface(0.0, par.road), road.slope(0.0, par.road)
+    mu = adhesion.adhesion(adhesion.peak_slip(ground, par.tyre), ground, par.tyre)
+    a = float(par.body.g * (mu * slope.cosine + slope.sine))
+    return v * v / (2.0 * a) if a > 0 else math.inf
 
 
 def ideal_recovery(

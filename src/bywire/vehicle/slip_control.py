@@ -63,14 +63,16 @@ class Memory(NamedTuple):
     omega_hat: Annotated[float, Signal("rad/s", "measured wheel speed", 60.0)]
     edge: Annotated[float, Signal("rad", "angle of the last encoder edge", 100.0)]
     age: Annotated[float, Signal("s", "time since the last encoder edge", 1e-3)]
-    v_last: Annotated[float, Signal("m/s", "speed at the last sample, in the sensor", 20.0)]
-    slip_integral: Annotated[float, Signal("Pa", "integral part of the slip PI", 1e6)]
+    v_last: Annotated[float, Signal("m/s", "speed at the sensor's last sample", 20.0)]
+    slip_integral: Annotated[float, Signal("Pa", "integral term of the slip PI", 1e6)]
     phase_x: Annotated[float, Signal("1", "phase of the rule-based ABS", 3.0)]
-    since_x: Annotated[float, Signal("s", "time since the last phase or step of the rules", 0.1)]
+    since_x: Annotated[
+        float, Signal("s", "time since the rule-based ABS began its phase or step", 0.1)
+    ]
     p_left_x: Annotated[float, Signal("Pa", "demand after the rule-based ABS", 1e6)]
     p_hat_x: Annotated[float, Signal("Pa", "pressure estimated by the rule-based ABS", 1e6)]
     p_held_x: Annotated[float, Signal("Pa", "last pressure that the road could hold", 1e6)]
-    rise_x: Annotated[float, Signal("Pa", "next step of the pressure", 1e5)]
+    rise_x: Annotated[float, Signal("Pa", "next pressure step", 1e5)]
     slowing_x: Annotated[float, Signal("m/s**2", "wheel's deceleration, filtered", 10.0)]
 
 
@@ -211,6 +213,6 @@ def far_from_peak(
         texts[
             f"slip control uses a slip set point of {slip_set:.3g} ({parameter}), but {surface} "
             f"has its maximum adhesion at {peak:.3g}. The wheel uses {100.0 * held / most:.0f} % "
-            "of it. A larger set point, or rules (abs=rules), would brake harder there"
+            "of it. A larger set point, or the rule-based ABS (abs=rules), would brake harder there"
         ] = None
     return list(texts)

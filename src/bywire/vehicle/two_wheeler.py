@@ -62,14 +62,16 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     front_tyre = Part(tyre, par="vehicle.front_tyre", suffix="_f", which="front")
     rear_tyre = Part(tyre, par="vehicle.rear_tyre", suffix="_r", which="rear")
     road = Part(road, par="vehicle.road")
-    E_brake_f = Integral("J", "heat of the front brake", role=_sink("front brake"))
-    E_brake_r = Integral("J", "heat of the rear brake", role=_sink("rear brake"))
+    E_brake_f = Integral("J", "heat dissipated by the front brake", role=_sink("front brake"))
+    E_brake_r = Integral("J", "heat dissipated by the rear brake", role=_sink("rear brake"))
     E_roll = Integral("J", "rolling resistance", role=_sink("rolling resistance"))
     E_tyre_f = Integral("J", "front tire: slip and deflection", role=_tyre("front tire"))
     E_tyre_r = Integral("J", "rear tire: slip and deflection", role=_tyre("rear tire"))
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
     W_pitch = Integral(
-        "J", "work of the braking forces on pitching", role=Role("source", "pitching", book=BOOK)
+        "J",
+        "work of the braking forces on the pitch motion",
+        role=Role("source", "pitching", book=BOOK),
     )
     t_locked_f = Integral("s", "time during which the front wheel is locked")
     t_locked_r = Integral("s", "time during which the rear wheel is locked")
@@ -86,8 +88,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     slip_r = Shown("1", "rear braking slip")
     sliding_f = Shown("1", "front tire slides")
     sliding_r = Shown("1", "rear tire slides")
-    mu_f = Shown("1", "front braking force relative to load")
-    mu_r = Shown("1", "rear braking force relative to load")
+    mu_f = Shown("1", "front braking force relative to the wheel load")
+    mu_r = Shown("1", "rear braking force relative to the wheel load")
     a = Shown("m/s**2", "deceleration", 10.0)
     E_vehicle = Shown(
         "J", "energy of the vehicle", role=Role("sink", "vehicle", book=BOOK, returns="any")

@@ -16,6 +16,7 @@ from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at, 
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.simulation.run import simulate
+from raising import raises
 
 SETS = ("dardanelli2010", "dardanelli2010-table1")
 NO_COULOMB = {"seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0}
@@ -114,7 +115,7 @@ def test_operating_points_that_have_no_slope_are_refused() -> None:
     with pytest.raises(ParameterError, match="at rest"):
         linearize(MotorcycleBrake(), par, state, memory, friction="sliding", **options)
     touching = state._replace(theta=par.master_cylinder.x_rest / par.gear.k_g)
-    with pytest.raises(ParameterError, match="just touches"):
+    with raises(ParameterError, name="contact"):
         linearize(MotorcycleBrake(), par, touching, memory, **options)
     moving = state._replace(omega=1e-3)
     with pytest.raises(ParameterError, match="not stuck"):

@@ -14,6 +14,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import equilibrium, linearize
 from bywire.plant import pad_hysteresis, shaft
 from bywire.simulation.run import Run, simulate
+from raising import raises
 from systems.pad_press import PADS, PAR, Memory, PadPress
 
 WIDTHS = (12.5e-6, 50e-6, 150e-6, 400e-6)
@@ -39,13 +40,11 @@ def test_within_its_width_a_spring_counts() -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_at_its_width_it_needs_a_side(sign: float) -> None:
     state = at(sign * WIDTHS[0], 1e-6, 0.0, 0.0)
-    with pytest.raises(
-        CornerError, match=r"pad-press: at the operating point, z_1 is at its width"
-    ):
+    with raises(CornerError, name="z_1"):
         linear(state)
     slipping, following = (linear(state, side=side) for side in ("above", "below"))
-    assert slipping.corners == ("z_1 slips at its width",)
-    assert following.corners == ("z_1 follows at its width",)
+    assert "z_1 slips" in " ".join(slipping.corners)
+    assert "z_1 sticks" in " ".join(following.corners)
     assert not slipping.A[2].any()
     assert following.A[2, 1] == pytest.approx(PAR.lead)
     np.testing.assert_array_equal(slipping.A[3:], following.A[3:])
@@ -64,7 +63,7 @@ def test_a_slipping_spring_follows_its_width() -> None:
     for sign in (1.0, -1.0):
         state = at(sign * 2.0 * by_angle, 0.0, 0.0, 0.0)
         model = linear(state, par, "above")
-        assert model.corners == ("z_1 slips at its width",)
+        assert "z_1 slips" in " ".join(model.corners)
         assert model.A[2, 1] == pytest.approx(sign * by_angle, rel=1e-9)
         assert linear(state, par, "below").A[2, 1] == pytest.approx(PAR.lead)
 

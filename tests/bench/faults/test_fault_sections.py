@@ -120,8 +120,8 @@ HOT = {"fault": "motor.hot"}
         (
             {"fault": "pressure.noise", "value": "-1 bar"},
             "faults[1].value",
-            "-100000 Pa",
-            ">= 0 Pa",
+            "-1 bar",
+            ">= 0 bar",
         ),
         ({**HOT, "onset": "1 s"}, "onset", "1 s", ""),
         ({**HOT, "onzet": "1 s"}, "key of faults[1]", "onzet", "onset"),

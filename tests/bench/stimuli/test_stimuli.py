@@ -111,7 +111,7 @@ def test_table_between_and_outside_its_nodes():
         ("rampp", {}, UnknownNameError, "did you mean 'ramp'"),
         ("ramp", {"slop": "1 A/s"}, UnknownNameError, "did you mean 'slope'"),
         ("ramp", {"end": "5 bar"}, UnitError, "ramp.end = '5 bar' has the wrong unit"),
-        ("ramp", {"slope": "0 A/s"}, ParameterError, "slope = 0.0 A/s .* must be > 0 A/s"),
+        ("ramp", {"slope": "0 A/s"}, ParameterError, "slope = 0 A/s .* must be > 0 A/s"),
         ("ramp", {"start": math.nan}, ParameterError, "any finite number in A"),
         ("ramp", {"after": "reverse"}, ParameterError, "after must be 'stay' or 'return'"),
         ("ramp", {"start": [1, 2]}, ParameterError, "must be one value"),

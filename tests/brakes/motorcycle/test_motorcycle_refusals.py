@@ -44,7 +44,7 @@ def changed(changes: dict[str, Any]) -> None:
         (
             {"port.x_port": 4.6e-3, **DEAD},
             {"port.x_port": 4.7e-3, **DEAD},
-            r"port\.x_port = 0\.0047 m must be < .* = 0\.004601 m",
+            r"port\.x_port = 4\.7 mm must be < .* = 4\.601 mm",
         ),
         ({"port.x_port": 4.7e-3}, {"port.x_port": 4.7e-3, **DEAD}, "never closes"),
     ],

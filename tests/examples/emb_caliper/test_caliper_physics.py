@@ -11,6 +11,7 @@ import bywire as toolkit
 from bywire.bench.energy_ledger import energy_residual
 from bywire.bench.experiment import as_run
 from bywire.core.errors import ParameterError
+from bywire.plant import floating_caliper
 
 F = 20e3
 
@@ -87,14 +88,16 @@ def test_steps_converge_with_the_second_order(emb: Any, par: Any) -> None:
 
 
 def test_caliper_is_the_cubic_that_is_passed_on(emb: Any, par: Any) -> None:
-    caliper = emb("elements.floating_caliper")
     touch = (33.7 - np.sqrt(33.7**2 - 4.0 * 7.23 * 4.97)) / (2.0 * 7.23)  # mm
     for x in (touch, 0.5, 1.0, 1.4):
         told = -7.23 * x**3 + 33.7 * x**2 - 4.97 * x
         n = 1e-3 * (x - touch)
-        assert 1e-3 * caliper.elastic(n, par.caliper) == pytest.approx(told, abs=1e-9)
-    assert caliper.stiffness(1e-3, par.caliper) == pytest.approx(
-        (caliper.elastic(1e-3 + 1e-9, par.caliper) - caliper.elastic(1e-3 - 1e-9, par.caliper))
+        assert 1e-3 * floating_caliper.elastic(n, par.caliper) == pytest.approx(told, abs=1e-9)
+    assert floating_caliper.stiffness(1e-3, par.caliper) == pytest.approx(
+        (
+            floating_caliper.elastic(1e-3 + 1e-9, par.caliper)
+            - floating_caliper.elastic(1e-3 - 1e-9, par.caliper)
+        )
         / 2e-9,
         rel=1e-6,
     )

@@ -79,9 +79,9 @@ def test_energy_closes_to_second_order(changes: dict[str, Any], caliper: Path) -
 def test_energy_closes_with_dead_time(caliper: Path) -> None:
     """The kinks at +-i_th need small steps, because each step has a single Newton iteration."""
     changes = {"inverter.law": "dead time", "inverter.V_f": "0.4 V"}
-    (coarse, _), (fine, recording) = (energies(changes, step) for step in ("20 us", "10 us"))
-    assert fine <= 1e-6
-    assert fine < coarse / 2.0
+    (coarse, _), (fine, recording) = (energies(changes, step) for step in ("10 us", "5 us"))
+    assert coarse <= 1e-6
+    assert fine < coarse / 4.0
     assert float(recording["E_inverter"][-1]) > 1.0
 
 
@@ -225,7 +225,6 @@ def test_exported_ecu_is_equal_bit_for_bit(caliper: Path, tmp_path: Path) -> Non
     )
     assert exported.holds
     hardware = (tmp_path / "emb_caliper_pmsm_io.c").read_text(encoding="utf-8")
-    assert "mechanics_clamp_force" in hardware  # from the module of the model's base class
     assert "angle_sensor_reading" in hardware
 
 
@@ -316,4 +315,5 @@ def test_a_campaign_injects_the_faults_of_the_new_elements(command: Any, tmp_pat
         "motor.demagnetized",
         "encoder.turned",
         "inverter.slow-driver",
+        "inverter.gates-off",
     }

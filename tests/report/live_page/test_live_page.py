@@ -80,7 +80,7 @@ def test_figures_of_a_brake_that_does_not_move_are_open_in_a_page_too(pages, tmp
     for kpi in result.kpis:
         assert given[kpi.name]["open"] == kpi.is_open, kpi.name
     assert given["overshoot"]["open"]
-    assert "does not move" in given["overshoot"]["reason"]
+    assert "hardly changes" in given["overshoot"]["reason"]
     (verdict,) = result.verdicts
     assert verdict.outcome == "undecided"
 

@@ -331,9 +331,9 @@ def on_stops(point: SmoothPoint, free: NDArray[np.bool_]) -> tuple[SmoothPoint, 
     if kinks and not side:
         names = ", ".join(kinks)
         raise CornerError(
-            f"{point.model.name}: at the operating point, {names} is at its width: it slips "
-            "outward, and follows its motion inward. Choose another operating point, or one side: "
-            f"{option('side', 'above')}, it slips, or {option('side', 'below')}, it follows",
+            f"{point.model.name}: at the operating point, {names} is at its slip limit. It slips "
+            "in one direction and sticks in the other. Choose another operating point, or one "
+            f"side: {option('side', 'above')} (it slips) or {option('side', 'below')} (it sticks)",
             name=names,
         )
     # Without a width, it has no effect.
@@ -341,8 +341,8 @@ def on_stops(point: SmoothPoint, free: NDArray[np.bool_]) -> tuple[SmoothPoint, 
     first, moving = len(point.model.frictions), list(point.moving)
     for each in slipping:
         moving[first + point.model.stops.index(each)] = 0.0
-    how = "slips" if side == ABOVE else "follows"
-    texts = tuple(f"{each} {how} at its width" for each in kinks)
+    how = "slips" if side == ABOVE else "sticks"
+    texts = tuple(f"where {each} {how} at its limit" for each in kinks)
     return replace(point, moving=moving), texts
 
 

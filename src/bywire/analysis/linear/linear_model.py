@@ -321,7 +321,7 @@ def _places(kind: str, names: Sequence[str], known: tuple[str, ...]) -> list[int
 DEAD = 1e-9
 """poles below this magnitude are deadbeat: their response ends within a sample"""
 STILL = 1e-6
-"""rates below this magnitude [1/s] count as zero: integrators at rest"""
+"""rates below this magnitude [1/s] are treated as zero: integrators at rest"""
 
 
 def rates(model: LinearModel) -> Complex:
@@ -352,7 +352,7 @@ def rates(model: LinearModel) -> Complex:
 
 # --- Transfer functions
 
-_ROUNDING = 100.0 * float(np.finfo(float).eps)  # of the largest entry: smaller values count as zero
+_ROUNDING = 100.0 * float(np.finfo(float).eps)  # of the largest entry; smaller values are zero
 
 
 @dataclass(frozen=True, eq=False)

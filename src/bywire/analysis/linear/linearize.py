@@ -28,7 +28,7 @@ from bywire.core.signals import signals_of, zeros
 from bywire.core.typing import Array
 
 Friction = Literal["removed", "sliding", "stuck"]
-_TOUCH = 1e-12  # overlap or gap [m] below which a contact counts as neither closed nor open
+_TOUCH = 1e-12  # overlap or gap [m] below which a contact is treated as neither closed nor open
 
 
 @checked
@@ -258,8 +258,8 @@ def _stiffness(
         left, slack, K = _active(C, d)
         if left < _TOUCH:
             raise ParameterError(
-                f"{model.name}: contact {at + int(np.argmin(slack))} just touches "
-                "at the operating point. Choose a point at which it is clearly open or closed",
+                f"{model.name}: contact {at + int(np.argmin(slack))} is just touching at the "
+                "operating point. Choose a point at which it is clearly open or closed",
                 name="contact",
             )
         blocks.append(K)

@@ -27,6 +27,7 @@ from bywire.core.errors import ParameterError, StepError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
+from bywire.core.units import shown
 
 Jacobians = list[Any]
 """Jacobians of the new memory with respect to states, memory and inputs"""
@@ -207,12 +208,13 @@ def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
     """
     count = round(period / step)
     if count < 1 or abs(count * step - period) > _WHOLE * step:
+        valid = shown(period / max(count, 1), "s", digits=12)
         raise StepError(
-            f"step = {step * 1e6:g} us does not divide the sample time of {period * 1e6:g} us. "
-            f"For example, use {period * 1e6 / max(count, 1):.12g} us",
+            f"step = {shown(step, 's')} does not divide the sample time of {shown(period, 's')}. "
+            f"For example, use {valid}",
             name="step",
-            value=f"{step * 1e6:g} us",
-            valid=f"{period * 1e6 / max(count, 1):.12g} us",
+            value=shown(step, "s"),
+            valid=valid,
         )
     n, m = model.B.shape
     W = np.zeros((n + m, n + m))

@@ -33,7 +33,7 @@ from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
 
 HARMONICS = 9
-"""highest harmonic that counts as distortion"""
+"""highest harmonic that is treated as distortion"""
 STILL = 1e-12
 """maximum peak-to-peak value of an output at rest, relative to its usual magnitude"""
 

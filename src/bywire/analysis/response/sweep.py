@@ -272,7 +272,7 @@ def _require_alike(run: Run, sweep: Sweep, points: Sequence[Run]) -> None:
         if structure_of(variant.model, variant.par) != structure:
             raise ParameterError(
                 f"variant {k} has a different model or a different choice. All variants need the "
-                "same ones",
+                "same model and choices",
                 name="variants",
                 value=str(k),
             )
@@ -436,7 +436,7 @@ def spread_of(figures: Complex, settled: NDArray[np.bool_]) -> tuple[Complex, Ar
     tuple
         Amplitudes, shape (cases, lines): those of the last window if they repeat, otherwise the
         mean of the windows that count. Their scatter, relative to the amplitude: root mean square
-        of the windows' distances from their mean. A drift counts as scatter.
+        of the windows' distances from their mean. A drift is treated as scatter.
     """
     seen = kept(figures, settled)
     mean = seen.mean(axis=1)

@@ -16,7 +16,7 @@ class Options(ParameterSet):
     input: str
     """stimulus of the model that [stimulus] drives (default: its only stimulus)"""
     output: str
-    """judged signal of the recording (default: the first one with the input's unit)"""
+    """recorded signal to evaluate (default: the first one with the input's unit)"""
     duration: Duration
     """duration of the run"""
     record: Duration

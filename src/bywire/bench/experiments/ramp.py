@@ -20,6 +20,7 @@ from bywire.bench.stimulus import Stimulus
 from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
+from bywire.core.units import shown
 
 InputRate = Annotated[float, Unit("input/s"), Field(gt=0, allow_inf_nan=False)]
 
@@ -34,9 +35,9 @@ class Options(ParameterSet):
     drive: str
     """input or recorded signal that drives the loop, such as a current (default: the input)"""
     start: InputLevel
-    """input at the beginning and at the end"""
+    """input value at the beginning and at the end of the run"""
     end: InputLevel
-    """input at the turning point"""
+    """input value at the turning point"""
     slope: InputRate
     """magnitude of the slope, in both directions"""
     t_hold: TimeConstant
@@ -55,9 +56,7 @@ def build(tested: TestedModel) -> Experiment:
 
     def course(options: Any, _: Mapping[str, Stimulus]) -> Course:
         if options.start == options.end:
-            raise not_valid(
-                "options.end", f"{options.end:g} {unit}", "different from options.start"
-            )
+            raise not_valid("options.end", shown(options.end, unit), "different from options.start")
         shape = ramp.Parameters(
             start=options.start,
             end=options.end,

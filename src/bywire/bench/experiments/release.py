@@ -37,7 +37,7 @@ class Options(ParameterSet):
     t_ramp: TimeConstant
     """time for the input to fall; 0 for a step"""
     empty: OutputLevel
-    """level below which the output counts as released"""
+    """level below which the output is considered released"""
     duration: Duration
     """duration of the recording after the start of the release"""
     record: Duration

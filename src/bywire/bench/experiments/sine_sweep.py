@@ -22,6 +22,7 @@ from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, TimeConstant, Unit
 from bywire.core.typing import Array
+from bywire.core.units import shown
 
 Count = Annotated[int, Unit("1", 5.0), Field(ge=1, le=1000)]
 
@@ -47,9 +48,9 @@ class Options(ParameterSet):
     n: Count
     """number of frequencies, with logarithmic spacing"""
     n_settle: Count
-    """settling periods at each frequency"""
+    """number of settling periods at each frequency"""
     n_periods: Count
-    """evaluated periods at each frequency"""
+    """number of evaluated periods at each frequency"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
@@ -105,7 +106,9 @@ def _require_rows(options: Any) -> None:
     longest = 1.0 / (_LEAST_ROWS * options.f_end)
     if options.record > longest:
         advice = f"to resolve sines of {options.f_end:g} Hz"
-        raise not_valid("options.record", f"{options.record:g} s", f"<= {longest:g} s", advice)
+        raise not_valid(
+            "options.record", shown(options.record, "s"), f"<= {shown(longest, 's')}", advice
+        )
 
 
 GENERIC = GenericExperiment(

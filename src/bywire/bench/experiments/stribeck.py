@@ -39,7 +39,7 @@ class Options(ParameterSet):
     friction: str
     """velocity with dry friction (default: the model's first)"""
     along: str
-    """state that affects the friction, with one curve per level; the velocity itself for one
+    """state that affects the friction, with one curve per level; the velocity itself for a single
     curve"""
     levels: Levels
     """levels of that state"""

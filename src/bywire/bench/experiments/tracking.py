@@ -1,4 +1,4 @@
-"""Tracking: an output follows a moving input, for example from a measured pedal."""
+"""Tracking: an output follows a moving input, for example from a recorded pedal signal."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Options(ParameterSet):
     settle: TimeConstant
     """time before time zero, at the stimulus's first value"""
     smoothing: TimeConstant
-    """averaging time for the key figures of tracking; 0 for the raw output"""
+    """averaging time for the tracking key figures; 0 for the raw output"""
 
 
 def build(tested: TestedModel) -> Experiment:

@@ -15,7 +15,7 @@ from bywire.bench.faults.modes import Mode, modes_of
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError, UnknownNameError, not_valid, quoted, unknown_name
 from bywire.core.model import Model
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import Leaf, ParameterSet
 from bywire.core.quantities import TimeConstant, Unit
 from bywire.core.typing import Array
 from bywire.core.values import number, parsed
@@ -25,7 +25,7 @@ Share = Annotated[float, Unit("1", 0.5), Field(gt=0, le=1, allow_inf_nan=False)]
 STAGES = 50  # number of steps in which a parameter follows a ramp
 MOST = 10_000
 """maximum number of an intermittent fault's periods in a run"""
-_EDGE = 1e-9  # s, tolerance within which a time counts as reached
+_EDGE = 1e-9  # s, tolerance within which a time is treated as reached
 
 
 class Course(ParameterSet):
@@ -253,13 +253,15 @@ def _value(where: str, section: Mapping[str, Any], mode: Mode) -> float:
                 value=quoted(section["value"]),
             )
         return 0.0
-    value = number(section.get("value", mode.value), mode.unit, f"{where}.value")
-    require_admissible(mode, value, f"{where}.value")
+    given = section.get("value", mode.value)
+    value = number(given, mode.unit, f"{where}.value")
+    text = given if isinstance(given, str) else ""
+    require_admissible(mode, value, f"{where}.value", text)
     return value
 
 
-def require_admissible(mode: Mode, value: float, where: str) -> None:
-    """Reject a value outside the range of a mode.
+def require_admissible(mode: Mode, value: float, where: str, text: str = "") -> None:
+    """Reject a value outside the range of a mode; errors use the unit of its text.
 
     Raises
     ------
@@ -269,11 +271,10 @@ def require_admissible(mode: Mode, value: float, where: str) -> None:
     low, high = _RANGES.get(mode.corrupted, (-math.inf, math.inf))
     is_whole = mode.corrupted in ("late", "dropped")
     if not low <= value <= high or (is_whole and value % 1):
-        unit = "" if mode.unit == "1" else f" {mode.unit}"
+        leaf = Leaf(where, Unit(mode.unit), low, high, low_open=False, high_open=False)
+        written, valid = leaf.outside_text(value, text)
         kind = "a whole number " if is_whole else ""
-        limits = f">= {low:g} and <= {high:g}" if math.isfinite(high) else f">= {low:g}"
-        valid = f"{kind}{limits}{unit} for fault {mode.name}"
-        raise not_valid(where, f"{value:g}{unit}", valid)
+        raise not_valid(where, written, f"{kind}{valid} for fault {mode.name}")
 
 
 def _unknown(name: str, modes: Mapping[str, Mode]) -> UnknownNameError:

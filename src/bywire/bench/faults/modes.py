@@ -177,17 +177,7 @@ def _demands(model: Model, declared: Collection[str]) -> Iterator[Channel]:
     """Yield a channel for every demand without a declared channel."""
     for name, signal in signals_of(model.Stimulus).items():
         if not name.startswith("noise_") and name not in declared:
-            summary = _label_first(model, signal.label)
-            yield Channel(name, summary, signal.unit, name, "demand", offset=signal.nominal)
-
-
-def _label_first(model: Model, label: str) -> str:
-    """Return a signal's label with the label of its inner assembly first, as in a sentence."""
-    for sub in _subs(model):
-        ending = f", {sub.label}"
-        if label.endswith(ending):
-            return f"{sub.label}: {label.removesuffix(ending)}"
-    return label
+            yield Channel(name, signal.label, signal.unit, name, "demand", offset=signal.nominal)
 
 
 def _of_channel(channel: Channel, tasks: Collection[str]) -> Iterator[Mode]:

@@ -43,7 +43,7 @@ def peak_current(current: Samples | None) -> float | Undefined:
 def mean_current(t: Samples, current: Samples | None) -> float | Undefined:
     """Time average of the motor current's magnitude.
 
-    Trapezoidal rule over the samples. Dither counts fully, even if it reverses the current.
+    Trapezoidal rule over the samples. Dither is fully included, even if it reverses the current.
     """
     if current is None:
         return Undefined("no current is recorded")

@@ -59,7 +59,7 @@ def _declared(module: ModuleType) -> Iterator[Family]:
         if not hasattr(module, "Setting"):
             raise ModelError(
                 f"{module.__file__} declares key figures but no data class Setting. Add one with "
-                "the names of the signals that the figures need",
+                "the names of the signals that the key figures need",
                 name="Setting",
             )
         loops = None if select else LoopFamily(module)

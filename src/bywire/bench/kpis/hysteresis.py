@@ -214,7 +214,7 @@ def closed_above(loop: Loop, width: float, levels: Array) -> float:
     loop
         The loop.
     width
-        Maximum width that counts as closed, in the unit of the drive.
+        Maximum width that is treated as closed, in the unit of the drive.
     levels
         Levels to check, ascending; levels that the loop does not cross are left out.
 

@@ -30,7 +30,7 @@ class Setting:
 def share_stuck(t: Samples, t_stuck: Samples | None, stuck: Samples | None) -> float | Undefined:
     """Fraction of time during which the shaft is stuck.
 
-    The engine integrates the time stuck, so short sticking between two samples counts. Recordings
+    The engine integrates the time stuck, including brief sticking between two samples. Recordings
     without this time use the samples of the mode, as in `share_sat_current`.
     """
     if t_stuck is not None:
@@ -46,7 +46,7 @@ def share_stuck(t: Samples, t_stuck: Samples | None, stuck: Samples | None) -> f
 def share_sat_current(t: Samples, sat_current: Samples | None) -> float | Undefined:
     """Fraction of time during which the current demand is saturated.
 
-    Trapezoidal mean of the mode's samples: a change counts as halfway between two samples.
+    Trapezoidal mean of the mode's samples: a change is assumed halfway between two samples.
     """
     if sat_current is None:
         return Undefined("the mode 'saturated current' is not recorded")
@@ -59,7 +59,7 @@ def share_sat_current(t: Samples, sat_current: Samples | None) -> float | Undefi
 def share_sat_duty(t: Samples, sat_duty: Samples | None) -> float | Undefined:
     """Fraction of time during which the duty cycle is saturated.
 
-    Trapezoidal mean of the mode's samples: a change counts as halfway between two samples.
+    Trapezoidal mean of the mode's samples: a change is assumed halfway between two samples.
     """
     if sat_duty is None:
         return Undefined("the mode 'saturated duty cycle' is not recorded")

@@ -21,7 +21,7 @@ class Setting:
     signal
         Name of the signal in the recording; the release begins at time zero.
     empty
-        Level below which the signal counts as released, in its SI unit.
+        Level below which the signal is treated as released, in its SI unit.
     """
 
     signal: str
@@ -48,7 +48,7 @@ def released(t: Samples, signal: Samples) -> Release | Undefined:
 def time_to_empty(released: Release, setting: Setting) -> float | Undefined:
     """Time from the release until the output stays below the level of a released brake.
 
-    Interpolated between the last sample above it and the next one.
+    Interpolated between the last sample above this level and the next sample.
     """
     t = released.t
     y = released.y
@@ -56,9 +56,9 @@ def time_to_empty(released: Release, setting: Setting) -> float | Undefined:
     while k >= 0 and not y[k] > setting.empty:
         k -= 1
     if k == len(t) - 1:
-        return Undefined("the output does not empty within the recording")
+        return Undefined("the output is not released within the recording")
     if k < 0:
-        return Undefined("the output was already empty at the release", is_open=True)
+        return Undefined("the output was already released before the release", is_open=True)
     share = (y[k] - setting.empty) / (y[k] - y[k + 1])
     return t[k] + share * (t[k + 1] - t[k])
 

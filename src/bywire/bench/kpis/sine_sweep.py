@@ -22,7 +22,7 @@ from bywire.core.typing import Array
 
 _HALF_POWER = math.sqrt(0.5)
 _ROUNDED = 1e-12  # of the output's maximum magnitude: smaller motion is rounding error
-_STILL = Undefined("the output does not move at the lowest frequency", is_open=True)
+_STILL = Undefined("the output does not respond at the lowest frequency", is_open=True)
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def sweep_peak(data: Sweep) -> float | Undefined:
 
 @measure("Hz")
 def sweep_bandwidth(data: Sweep) -> float | Undefined:
-    """Frequency at which the gain falls below 0.707 of the gain at the lowest frequency (-3 dB).
+    """Frequency at which the gain falls below 0.707 times the gain at the lowest frequency (-3 dB).
 
     The first crossing, interpolated in the logarithms of frequency and gain.
     """
@@ -165,5 +165,5 @@ def sweep_lag(data: Sweep) -> float | Undefined:
     """Phase lag of the output behind the input at the highest frequency."""
     if not data.moves.all():
         f = data.frequencies[np.argmin(data.moves)]
-        return Undefined(f"the output does not move at {f:g} Hz", is_open=True)
+        return Undefined(f"the output does not respond at {f:g} Hz", is_open=True)
     return float(-np.rad2deg(np.unwrap(np.angle(data.values))[-1]))

@@ -24,7 +24,7 @@ from bywire.bench.kpis.samples import Samples, integral, moving_average, total, 
 _DEAD, _BAND = 0.05, 0.02  # of the step height: end of the dead time; half settling band
 _MOVING = 0.02  # of the step height, between both halves of the steady-state window
 _LAST = 0.2  # of the time after the step: default steady-state window
-_SETTLED = 0.1  # of the time after the step: minimum time in the band that counts as settled
+_SETTLED = 0.1  # of the time after the step: minimum time in the band that is treated as settled
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def response_from(
 def dead_time(response: Response) -> float | Undefined:
     """Time from the step until the response first reaches 5 % of the step height.
 
-    For a first-order lag without dead time, this figure is 0.051 of the time constant.
+    For a first-order lag without dead time, this time is 0.051 times the time constant.
     """
     return _first(response, _DEAD)
 
@@ -180,12 +180,12 @@ def rise_time(response: Response) -> float | Undefined:
 
 @measure("s")
 def settling_time(response: Response) -> float | Undefined:
-    """Time from the step until the response stays within 2 % of the step height of the end level.
+    """Time from the step until the response stays in a band of +-2 % of the step height.
 
-    The last entry into this band is interpolated. The figure is undefined if that entry is in the
-    last tenth of the time after the step, where a longer recording could show a later entry. A
-    response with ripple of more than 4 % peak to peak, or a steady-state error of more than 2 %,
-    never settles.
+    The last entry into this band around the final value is interpolated. The time is undefined if
+    that entry is in the last tenth of the time after the step, where a longer recording could show
+    a later entry. A response with ripple of more than 4 % peak to peak, or a steady-state error of
+    more than 2 %, never settles.
     """
     unseen = why_unseen(response)
     if unseen is not None:
@@ -211,10 +211,10 @@ def settling_time(response: Response) -> float | Undefined:
 
 @measure("%")
 def overshoot(response: Response) -> float | Undefined:
-    """Maximum excess of the response over the end level, in % of the step height.
+    """Maximum excess of the response over its final value, in % of the step height.
 
-    The maximum sample counts. The figure is 0 if the response never exceeds the end level. If the
-    response does not settle, it is unknown whether it would overshoot.
+    The peak is the largest sample. The overshoot is 0 if the response never exceeds the final
+    value. If the response does not settle, it is unknown whether it would overshoot.
     """
     unseen = why_unseen(response)
     if unseen is not None:
@@ -254,7 +254,7 @@ def ripple(response: Response) -> float | Undefined:
     """Peak-to-peak value of the response in the steady-state window.
 
     Maximum minus minimum sample. The default window is the last 20 % of the time after the step.
-    Smoothing also removes ripple of its own period from this figure.
+    Smoothing also removes ripple of the smoothing period from this key figure.
     """
     if not response.has_window:
         return _without_window(response.low, response.high)
@@ -300,7 +300,7 @@ def _why_still(response: Response) -> Undefined | None:
     if not response.most <= _DEAD * height:
         return None
     return Undefined(
-        f"the response does not move: it changes by at most {response.most:.3g} in a step of "
+        f"the response hardly changes: it varies by at most {response.most:.3g} in a step of "
         f"{height:.3g} {{level}}",
         is_open=True,
     )

@@ -72,9 +72,9 @@ class Tracking:
         from scipy import optimize  # slow to load, and only this needs it
 
         if np.ptp(self.demand) == 0.0:
-            return Undefined("the set point does not move", is_open=True)
+            return Undefined("the set point does not change", is_open=True)
         if np.ptp(self.y) <= _STILL * np.ptp(self.demand):
-            return Undefined("the signal does not move", is_open=True)
+            return Undefined("the signal does not change", is_open=True)
 
         def misfit(delay: float) -> float:
             return float(np.mean((self.y - self.delayed(delay)) ** 2))

@@ -163,7 +163,7 @@ def lift_time(stop: Stop, support: Samples) -> float:
 
 @measure("J")
 def disc_energy(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float:
-    """Heat into all brake discs."""
+    """Total heat into all brake discs."""
     return _heat(stop, heat_front) + _heat(stop, heat_rear)
 
 
@@ -217,13 +217,13 @@ def longest_lock_rear(stop: Stop, omega_rear: Samples) -> float:
 
 @measure("%")
 def disc_share_front(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float | Undefined:
-    """Fraction of the disc heat that goes into this wheel's discs."""
+    """Fraction of the total disc heat that goes into this wheel's discs."""
     return _share(_heat(stop, heat_front), _heat(stop, heat_rear))
 
 
 @measure("%")
 def disc_share_rear(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float | Undefined:
-    """Fraction of the disc heat that goes into this wheel's discs."""
+    """Fraction of the total disc heat that goes into this wheel's discs."""
     return _share(_heat(stop, heat_rear), _heat(stop, heat_front))
 
 

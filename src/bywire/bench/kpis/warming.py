@@ -104,9 +104,9 @@ def final_winding(data: Warming) -> float | Undefined:
 
 @measure("s", needs=("derated",))
 def time_derated(data: Warming) -> float | Undefined:
-    """Time during which the motor's current is limited because of high temperature.
+    """Time during which the motor's current is limited because the motor is too hot.
 
-    Trapezoidal integral of the mode's samples: a change counts as halfway between two samples.
+    Trapezoidal integral of the mode's samples: a change is assumed halfway between two samples.
     """
     if data.derated is None:
         return Undefined("the mode 'derated' is not recorded")

@@ -1,4 +1,4 @@
-"""A table of times and values, for example from a measured pedal."""
+"""A table of times and values, for example from a recorded pedal signal."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Parameters(ParameterSet):
             )
         for a, b in pairwise(t):
             if a >= b:
-                raise ValueError(f"times must increase, got {b:g} s after {a:g} s")
+                raise ValueError(f"times must be in increasing order, got {b:g} s after {a:g} s")
         return self
 
 

@@ -93,8 +93,9 @@ def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
             break
         start *= p / settled
     raise SolverError(
-        f"no current makes the dithered pressure settle at p_start = {p / 1e5:g} bar (last: "
-        f"{settled / 1e5:.4g} bar). Change p_start, increase settle, or set start = 'frictionless'",
+        f"no current makes the dithered pressure settle at p_start = {p / 1e5:g} bar (last "
+        f"value: {settled / 1e5:.4g} bar). Change p_start, increase settle, or set start = "
+        "'frictionless'",
         name="p_start",
         value=f"{p / 1e5:g} bar",
     )

@@ -59,9 +59,9 @@ def admissible_frequencies(par: Par, low: float, high: float, count: int) -> lis
     inside = [f for f in frequencies if low * (1 - 1e-9) <= f <= high * (1 + 1e-9)]
     if not inside:
         raise ParameterError(
-            f"no dither frequency from {low:g} to {high:g} Hz has a period of an even number of "
-            f"sample times of {T * 1e3:g} ms. Widen the range (f_min, f_max), or sample faster "
-            "(ecu.T_s)",
+            f"no dither frequency from {low:g} to {high:g} Hz has a period equal to an even number "
+            f"of sample times ({T * 1e3:g} ms each). Widen the range (f_min, f_max), or sample "
+            "faster (ecu.T_s)",
             name="f_min",
             value=f"{low:g}",
         )
@@ -260,7 +260,7 @@ def _figures(par: Par, values: Array, periods: int, samples: int) -> dict[str, f
 def _ripple(pressure: Array, samples: int) -> float:
     """Return the dither's ripple: the pressure's peak-to-peak value, as the median of all periods.
 
-    If dither is too weak to free the piston, the controller's integral part does so occasionally.
+    If dither is too weak to free the piston, the controller's integral term does so occasionally.
     The median ignores these jumps.
     """
     return float(np.median(np.ptp(pressure.reshape(-1, samples), axis=1)))
@@ -295,7 +295,7 @@ def area_ratios(par: Par, designs: Sequence[tuple[float, float]]) -> list[float]
 Figures = Mapping[str, Array]
 
 OVERCOMES = ("stuck", "band")
-"""figures that decrease with the amplitude: below their limits friction counts as overcome"""
+"""figures that decrease with the amplitude: below their limits friction is treated as overcome"""
 COSTS = ("ripple_caliper", "current_share", "duty_share")
 """figures that increase with the amplitude"""
 

@@ -187,7 +187,8 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
     """
     if par.caliper.leak == "leaking" or par.port.law == "leaking":
         raise ParameterError(
-            "eq. (14) does not include leaks, and a leaking brake has no equilibrium. Set "
+            "eq. (14) of Dardanelli et al. does not include leaks, and a leaking brake has no "
+            "equilibrium. Set "
             "caliper.leak = 'tight' and port.law = 'makeup', or use a simulation",
             name="caliper.leak" if par.caliper.leak == "leaking" else "port.law",
             value="'leaking'",

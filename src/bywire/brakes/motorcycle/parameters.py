@@ -18,6 +18,7 @@ from bywire.control import (
 from bywire.control.dither import Believed
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Pressure
+from bywire.core.units import shown
 from bywire.plant import (
     adc,
     anti_alias_filter,
@@ -130,8 +131,8 @@ class MotorcycleParameters(ParameterSet):
         if not closed < stroke:
             raise RuleError(
                 "port.x_port",
-                f"{self.port.x_port:g} m",
-                f"< the piston's stroke x_end - x_rest = {stroke:g} m",
+                shown(self.port.x_port, "m"),
+                f"< the piston's stroke x_end - x_rest = {shown(stroke, 'm')}",
                 "otherwise the port never closes",
             )
         room = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest - closed)

@@ -63,7 +63,8 @@ def by_voltage(par: ParameterSet, at: PlantPoint) -> LinearModel:
 CURRENT = Plant(
     name="motorcycle-plant",
     assembly="motorcycle-brake",
-    summary="motor current to pressures: gear, master cylinder, pipeline, caliper (eq. 14)",
+    summary="motor current to pressures: gear, master cylinder, pipeline, caliper (eq. (14) of "
+    "Dardanelli et al.)",
     at=_AT,
     model=by_current,
     band=50.0,

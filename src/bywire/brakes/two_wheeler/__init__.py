@@ -3,5 +3,5 @@
 from bywire.core.brake import Brake
 
 BRAKE = Brake(
-    "two-wheeler", "motorcycle with two brakes by wire and slip control, on any surface", __name__
+    "two-wheeler", "motorcycle with two by-wire brakes and slip control, on any surface", __name__
 )

@@ -61,17 +61,17 @@ class Memory(NamedTuple):
     edge_r: Annotated[float, Signal("rad", "angle of the last rear encoder edge", 100.0)]
     age_f: Annotated[float, Signal("s", "time since the last front encoder edge", 1e-3)]
     age_r: Annotated[float, Signal("s", "time since the last rear encoder edge", 1e-3)]
-    v_last: Annotated[float, Signal("m/s", "speed at the last sample, in the sensor", 20.0)]
-    slip_f_integral: Annotated[float, Signal("Pa", "integral part of the front slip PI", 2e6)]
-    slip_r_integral: Annotated[float, Signal("Pa", "integral part of the rear slip PI", 2e6)]
-    lift_integral: Annotated[float, Signal("Pa", "integral part of the lift PI", 2e6)]
+    v_last: Annotated[float, Signal("m/s", "speed at the sensor's last sample", 20.0)]
+    slip_f_integral: Annotated[float, Signal("Pa", "integral term of the front slip PI", 2e6)]
+    slip_r_integral: Annotated[float, Signal("Pa", "integral term of the rear slip PI", 2e6)]
+    lift_integral: Annotated[float, Signal("Pa", "integral term of the lift PI", 2e6)]
     phase_f: Annotated[float, Signal("1", "phase of the front rule-based ABS", 3.0)]
     phase_r: Annotated[float, Signal("1", "phase of the rear rule-based ABS", 3.0)]
     since_f: Annotated[
-        float, Signal("s", "time since the last phase or step of the front rules", 0.1)
+        float, Signal("s", "time since the front rule-based ABS began its phase or step", 0.1)
     ]
     since_r: Annotated[
-        float, Signal("s", "time since the last phase or step of the rear rules", 0.1)
+        float, Signal("s", "time since the rear rule-based ABS began its phase or step", 0.1)
     ]
     p_left_f: Annotated[float, Signal("Pa", "front demand after the rule-based ABS", 2e6)]
     p_left_r: Annotated[float, Signal("Pa", "rear demand after the rule-based ABS", 2e6)]
@@ -83,8 +83,8 @@ class Memory(NamedTuple):
     p_held_r: Annotated[
         float, Signal("Pa", "last pressure that the road could hold at the rear wheel", 2e6)
     ]
-    rise_f: Annotated[float, Signal("Pa", "next step of the front pressure", 1e5)]
-    rise_r: Annotated[float, Signal("Pa", "next step of the rear pressure", 1e5)]
+    rise_f: Annotated[float, Signal("Pa", "next front pressure step", 1e5)]
+    rise_r: Annotated[float, Signal("Pa", "next rear pressure step", 1e5)]
     slowing_f: Annotated[float, Signal("m/s**2", "front wheel deceleration, filtered", 10.0)]
     slowing_r: Annotated[float, Signal("m/s**2", "rear wheel deceleration, filtered", 10.0)]
 

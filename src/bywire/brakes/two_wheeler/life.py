@@ -30,7 +30,7 @@ class WearParameters(ParameterSet):
     V_new: Volume
     """fluid in the reservoir with new pads"""
     V_min: Volume
-    """fluid volume below which the vehicle warns"""
+    """fluid volume below which the vehicle warns the rider"""
 
 
 def begin(par: TwoWheelerParameters, wear: WearParameters) -> Values:

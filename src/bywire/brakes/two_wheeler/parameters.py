@@ -57,7 +57,7 @@ class EcuParameters(ParameterSet):
     lift: Literal["off", "pi"]
     """rear wheel lift control"""
     sees: Literal["estimated", "known"]
-    """source of speed and slip: estimated from the sensors, or known exactly"""
+    """source of the speed and the slip: estimated from the sensors, or known exactly"""
     p_rate: PressureRate
     """maximum build-up rate of a demand"""
     wheel_speed: wheel_speed.Parameters

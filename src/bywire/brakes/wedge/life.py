@@ -125,7 +125,7 @@ def left(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Values:
 
 WEDGE_PADS = Life(
     name="wedge-pads",
-    summary="wedge brake pads on a quarter car, until lining or wedge travel is used up",
+    summary="wedge brake pads on a quarter car, until the lining or the wedge travel is used up",
     experiment="corner-stop",
     wear=WearParameters,
     values={

@@ -239,7 +239,8 @@ def screw_position_point(par: ParameterSet, value: float) -> Point:
 SCREW_POSITION_LOOP = Loop(
     name="screw-position",
     assembly="wedge-brake",
-    summary="position control of one motor on a preloaded screw, at 5 kHz (Figs. 5 and 6)",
+    summary="position control of one motor on a preloaded screw, at 5 kHz (Figs. 5 and 6 of "
+    "Roberts et al.)",
     at=Quantity("motor angle", "rad", 0.0),
     inputs=("theta_1_set",),
     output="theta_1",
@@ -259,7 +260,7 @@ SCREW_POSITION_LOOP = Loop(
 def force_point(par: ParameterSet, value: float) -> Point:
     """Return both motors in position control, at rest with a force [N] between their screws.
 
-    Each nut is half the compression away from the middle. The controllers have no integral part, so
+    Each nut is half the compression away from the middle. The controllers have no integral term, so
     the references are farther away, by the angle errors that produce the holding currents.
 
     Raises

@@ -107,7 +107,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     T_fr_1 = Shown("N*m", "friction torque 1", 0.1)
     T_fr_2 = Shown("N*m", "friction torque 2", 0.1)
     F_fr = Shown("N", "friction on the wedge", 50.0)
-    contacts = Shown("1", "closed contacts in the heart, sum of 1, 2, 4", 4.0)
+    contacts = Shown("1", "closed contacts in the brake heart, as a sum of 1, 2 and 4", 4.0)
     stuck = Shown("1", "shafts and wedge stuck")
     P_in = Shown("W", "power at the drives' input", 50.0)
     P_meas = Shown("W", "power at the drives' input, filtered", 50.0)

@@ -11,6 +11,7 @@ from bywire.brakes.wedge.laws import gap_adjusting, moment_control, screw_offset
 from bywire.control import derating, position_pd
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Force, Inertia, Torque
+from bywire.core.units import shown
 from bywire.plant import (
     axial_bearing,
     clearance_adjuster,
@@ -104,8 +105,8 @@ class WedgeParameters(ParameterSet):
         if self.adjuster.law != "none" and abs(T / slow - round(T / slow)) > 1e-6:
             raise RuleError(
                 "control.adjuster.T_adjust",
-                f"{T:g} s",
-                f"a whole multiple of control.T_slow = {slow:g} s",
+                shown(T, "s"),
+                f"a whole multiple of control.T_slow = {shown(slow, 's')}",
                 "because the moment control follows the adjuster's turns",
             )
         return self

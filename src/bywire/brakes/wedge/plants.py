@@ -148,7 +148,7 @@ def mechanical(whole: LinearModel, *, corrected: bool = False) -> LinearModel:
     whole
         From `full`.
     corrected
-        Whether to include the drives' first lag behind the rotors. The integral part has to follow
+        Whether to include the drives' first lag behind the rotors. The integral term has to follow
         the back-EMF, which acts like an inertia :math:`K_T^2/(V_{dc} k_i)` on each rotor.
 
     Returns

@@ -108,7 +108,7 @@ RELATIONS: tuple[Relation, ...] = (
         {"x": "m", "F_N": "N"},
         _from_travel,
         lambda par: np.array([par.caliper.clearance, 1.0 / par.caliper.K_cal]),
-        "caliper as a spring; disc runout counts as noise",
+        "caliper as a spring; disc runout is treated as noise",
     ),
 )
 """relations in order of preference. bywire uses the first one whose signals are measured"""

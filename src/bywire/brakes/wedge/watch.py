@@ -14,8 +14,8 @@ from bywire.core.parameters import ParameterSet
 
 Rows = NDArray[np.bool_]
 
-_REACHED = 0.95  # fraction of the demanded moment that counts as reached
-_LONG = 0.05  # time [s] at the current limit after which a moment counts as out of reach
+_REACHED = 0.95  # fraction of the demanded moment that is treated as reached
+_LONG = 0.05  # time [s] at the current limit after which a moment is treated as out of reach
 _SWINGS = 10  # reversals between current limits, at most _LONG apart; a step has fewer
 
 

@@ -223,7 +223,7 @@ def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialec
     """Reject a table that seems to end within its last number.
 
     Many programs write no line ending after a table, so a truncation there is not obvious. The
-    last number counts as truncated if hardly any number above it in that column is as short: in
+    last number is treated as truncated if hardly any number above it in that column is as short: in
     decimals if their count is constant, otherwise in characters.
 
     Parameters

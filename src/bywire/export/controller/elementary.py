@@ -83,7 +83,7 @@ static inline bool is_usual({real} x)
     if has_limits:
         parts.append(f"""/*
  * Return a command limited to plus and minus its limit. A limit that is negative or NaN
- * counts as 0.
+ * is treated as 0.
  */
 static inline {real} within({real} command, {real} limit)
 {{
@@ -260,7 +260,7 @@ static double log_parts(double a, double *low)
     return high;
 }}"""
 
-_LOGARITHM = """/* Return the natural logarithm of a; values below 1e-300 count as 1e-300. */
+_LOGARITHM = """/* Return the natural logarithm of a; values below 1e-300 are treated as 1e-300. */
 static double logarithm(double a)
 {
     double low;

@@ -499,7 +499,7 @@ def _contract(program: Program) -> list[str]:
     if limits:
         said += [
             "Commands. These commands stay within their limits for any inputs, memory and "
-            "parameters. A limit that is negative or NaN counts as 0:",
+            "parameters. A limit that is negative or NaN is treated as 0:",
             "\n".join(limits),
         ]
     said.append(

@@ -312,7 +312,7 @@ def _uses(value: Any) -> frozenset[Any]:
 # --- Functions: one version of each law for every structure of its arguments
 
 DEEP = 40
-"""call depth above which a law counts as recursive"""
+"""call depth above which a law is treated as recursive"""
 
 
 @dataclass

@@ -28,7 +28,7 @@ from bywire.export.controller.contract import LARGEST
 from bywire.export.controller.program import Program, Step
 
 _Place = tuple[Any, ...]
-"""call stack of a comparison, innermost location first; ``core.ops`` counts as one location"""
+"""call stack of a comparison, innermost location first; ``core.ops`` is treated as one location"""
 Margins = dict[_Place, float]
 """distance of the two sides of each comparison"""
 _LESS = ("__lt__", "__ge__")

@@ -396,7 +396,7 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
             v.causality,
             v.unit,
             "" if v.start is None else f"{v.start:.6g}",
-            "" if v.leaf is None else v.leaf.range_text,
+            "" if v.leaf is None else v.leaf.range_in(v.leaf.unit.symbol),
             v.label,
         )
         for v in faces.variables

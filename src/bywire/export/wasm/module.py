@@ -503,7 +503,7 @@ def _description(
                 "start": each.start,
                 "low": low,
                 "high": high,
-                "range": "" if each.leaf is None else each.leaf.range_text,
+                "range": "" if each.leaf is None else each.leaf.range_in(each.leaf.unit.symbol),
                 "meaning": each.label,
                 "used": each.name in used,
             }

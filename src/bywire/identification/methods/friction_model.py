@@ -224,9 +224,9 @@ class Options(ParameterSet):
         "stribeck-asymmetric",
         "stribeck-pressure",
     ]
-    """one of the laws, or 'choose' for a comparison of all on held-out data"""
+    """one of the laws, or 'choose' to compare all of them on held-out data"""
     slowest: Share
-    """fraction of the maximum speed; slower samples stick or reverse, and are not used"""
+    """minimum speed as a fraction of the maximum speed; slower samples stick or reverse"""
     pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=1)]
     """pressures of simulated records, one per record"""
     v_max: Annotated[float, Unit("m/s", 0.1), Field(gt=0)]

@@ -14,6 +14,7 @@ from bywire.bench.experiment import Case, as_run
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError, unknown_name, unknown_of_few
 from bywire.core.signals import Signal, signals_of, without_noise
+from bywire.data.named_columns import reject_swapped
 from bywire.identification.bench_fit import BenchFit, noise_given
 from bywire.identification.bench_replay import case_of
 from bywire.identification.method import Method
@@ -149,6 +150,8 @@ def _require_known(case: Case, question: Question) -> None:
         )
     driven = without_noise(stimuli)
     states = case.model.State._fields
+    reject_swapped("outputs", question.columns, outputs)
+    reject_swapped("inputs", question.inputs, driven)
     for kind, names, known, refused in (
         ("output", question.noise, outputs, unknown_name),
         ("stimulus", question.inputs, driven, unknown_of_few),

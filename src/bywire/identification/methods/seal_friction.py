@@ -419,7 +419,7 @@ class Options(ParameterSet):
     bore: Annotated[float, Unit("m", 0.025), Field(ge=0, allow_inf_nan=False)]
     """diameter of the cylinder, to check the area; 0 if unknown"""
     zero: Literal["known", "free"]
-    """zero of the force sensor: assumed correct, or estimated"""
+    """zero offset of the force sensor: assumed to be zero, or estimated"""
     pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=2)]
     """chamber pressures of simulated records, one per record"""
     interval: Duration
@@ -594,7 +594,8 @@ def known(par: None, options: Options) -> dict[str, float]:
 METHOD = Method(
     name="seal-friction",
     assembly="",
-    summary="friction of a sealed piston, from strokes in both directions (2010, eq. 16)",
+    summary="friction of a sealed piston, from strokes in both directions (eq. (16) of "
+    "Dardanelli et al.)",
     experiment="",
     signals={"F": "N", "x": "m", "p": "Pa"},
     options=Options,
@@ -620,6 +621,6 @@ METHOD = Method(
         "A": ("m**2", "area"),
         "F_0": ("N", "friction without pressure"),
         "f": ("N/Pa", "friction per unit pressure"),
-        "F_off": ("N", "zero of the force sensor, with zero=free"),
+        "F_off": ("N", "zero offset of the force sensor, with zero=free"),
     },
 )

@@ -1,9 +1,9 @@
 /* Sampled or analog loops from the Jacobians that the module computes: response and margins.
  * The definitions are those of bywire.margins. Matrices are arrays of rows. */
 
-const TOUCH = 1e-12; // m, below which a contact counts as neither closed nor open
+const TOUCH = 1e-12; // m, below which a contact is treated as neither closed nor open
 const LOWEST = 1e-2, NYQUIST = 0.998, POINTS = 2000; // Hz, fraction of half the sampling frequency
-const ON_BORDER = 1e-6; // growth per sample that still counts as an integrator
+const ON_BORDER = 1e-6; // growth per sample that is still treated as an integrator
 
 const zeros = (rows, columns) => Array.from({ length: rows }, () => new Float64Array(columns));
 const eye = (n) => zeros(n, n).map((row, k) => ((row[k] = 1), row));
@@ -67,7 +67,7 @@ function jacobiansOf({ memory, room, parameters, ...functions }, { entry, size, 
   return { A, B, numbers: numbers.slice(contacts), ticks: every.map(() => ({ X: next(held, states), M: next(held, held) })) };
 }
 
-const EQUAL = 1e-5, SAME = 1e-6, FREQUENCIES = 40; // models, numbers that count as one; where models are compared
+const EQUAL = 1e-5, SAME = 1e-6, FREQUENCIES = 40; // models, numbers that are treated as one; where models are compared
 
 /** Return a loop's gain where both sides of a kink agree; null without a point, "corner" where they do not. */
 function modelOf(exported, loop) {

@@ -1,6 +1,6 @@
 /* Margins of a loop gain L, negative feedback not counted; definitions as in bywire.margins. */
 
-const NO_LOOP = 1e-9, LEAST_FACTOR = 1e-9; // loop gain that counts as zero; minimum factor, at a pole on the stability limit
+const NO_LOOP = 1e-9, LEAST_FACTOR = 1e-9; // loop gain that is treated as zero; minimum factor, at a pole on the stability limit
 const SLOWEST = 1e-6, SLOW_POINTS = 40; // below the diagram, where the loop gain is real, Hz
 const DEGREE = 180 / Math.PI;
 const wrapped = (angle) => angle - 360 * Math.floor((angle + 180) / 360);

@@ -24,7 +24,7 @@ class Memory(NamedTuple):
     """Memory of the controller between its ticks."""
 
     v: Annotated[float, Signal("V", "motor voltage", 6.0), Limited("control.v_max")]
-    v_i: Annotated[float, Signal("V", "integral part", 1.0)]
+    v_i: Annotated[float, Signal("V", "integral term", 1.0)]
 
 
 class StarterActuator(Assembly[Parameters, Memory]):

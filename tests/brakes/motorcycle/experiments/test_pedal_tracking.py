@@ -56,7 +56,7 @@ def test_set_point_that_does_not_move_has_no_lag():
     found = judged(0.1, lambda t: np.full(t.shape, 20e5))
     for name in ("tracking_lag", "tracking_rms_without_lag"):
         assert math.isnan(found[name].value)
-        assert found[name].note == "the set point does not move"
+        assert found[name].note == "the set point does not change"
 
 
 def test_built_in_ride_beyond_a_shorter_pedal_is_refused():

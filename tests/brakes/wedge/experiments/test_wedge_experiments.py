@@ -104,7 +104,7 @@ def test_steps_within_the_clearance(results):
 
 
 def test_friction_that_a_step_leaves_behind(results):
-    """Without integral part a shaft sticks within its breakaway torque over the loop's stiffness.
+    """Without an integral term, a shaft sticks within breakaway torque over loop stiffness.
 
     The wedge's friction and the screws' compression shift both shafts by little more.
     """

@@ -69,7 +69,7 @@ def drive(
 def emf_inertia(par: WedgeParameters) -> float:
     """Return the inertia [kg m^2] that the back-EMF seems to add to a slow motion.
 
-    The current controller's integral part must follow the EMF: an error of K_T / (V k_i) times
+    The current controller's integral term must follow the EMF: an error of K_T / (V k_i) times
     the acceleration remains, and the torque of that current is missing.
     """
     return par.motor_1.K_ref**2 / (par.drive.V_dc * par.drive.k_i)

@@ -55,7 +55,7 @@ def judged(options: Options) -> dict[str, Any]:
 EXPERIMENT = Experiment(
     name="current-step",
     assembly="motorcycle-brake",
-    summary="step of {i_step} in the closed current loop (Fig. 3)",
+    summary="step of {i_step} in the closed current loop (Fig. 3 of Dardanelli et al.)",
     options=Options,
     defaults=Options(i_step=0.73, duration=0.04, record=1e-4),
     cases=cases,

@@ -99,7 +99,8 @@ _LOOP = units_of("hysteresis", "occupation", resolved={"drive": "A", "drive*resp
 EXPERIMENT = Experiment(
     name="friction-ramp",
     assembly="motorcycle-brake",
-    summary="slow current ramp to {i_max} and back, with and without dither (Fig. 5, eq. 17)",
+    summary="slow current ramp to {i_max} and back, with and without dither (Fig. 5 of "
+    "Dardanelli et al.)",
     options=Options,
     defaults=Options(i_max=5.0, slope=0.2, f_filter=20.0, smoothing=0.02),
     cases=cases,

@@ -23,7 +23,7 @@ class Options(ParameterSet):
     duration: Duration
     """recording time after the step"""
     settle: TimeConstant
-    """time before the step for dither and loop to settle"""
+    """time before the step for the dither and the loop to settle"""
     smoothing: TimeConstant
     """moving average for the step's KPIs; default: one dither period; 0: raw pressure"""
 
@@ -69,7 +69,8 @@ def judged(options: Options) -> dict[str, Any]:
 EXPERIMENT = Experiment(
     name="hard-braking",
     assembly="motorcycle-brake",
-    summary="pressure step from {p_from} to {p_to} in closed loop, as in Fig. 7a",
+    summary="pressure step from {p_from} to {p_to} in closed loop, as in Fig. 7a of Dardanelli "
+    "et al.",
     options=Options,
     defaults=Options(p_from=6e5, p_to=37e5, duration=1.2, settle=1.0, smoothing=0.02),
     cases=cases,

@@ -33,7 +33,7 @@ class Options(ParameterSet):
     """The ride."""
 
     trace: str
-    """measurement file with time and pedal, force or pressure; empty: built-in ride"""
+    """measurement file with time and pedal, force or pressure; leave empty for the built-in ride"""
     trace_map: str
     """mapping file for pedal, force or pressure; empty if the columns have these names"""
     max_gap: TimeConstant
@@ -126,7 +126,8 @@ def _set_point(force: float, par: MotorcycleParameters) -> float:
 EXPERIMENT = Experiment(
     name="pedal-tracking",
     assembly="motorcycle-brake",
-    summary="pressure follows a built-in or measured trace of the rider's pedal (Fig. 7b)",
+    summary="pressure follows a built-in or measured trace of the rider's pedal (Fig. 7b of "
+    "Dardanelli et al.)",
     options=Options,
     defaults=Options(trace="", trace_map="", max_gap=0.1, smoothing=0.02),
     cases=cases,

@@ -102,7 +102,7 @@ EXPERIMENT = Experiment(
     name="pressure-release",
     formerly="release",
     assembly="motorcycle-brake",
-    summary="release from {p_from}: time to empty, residual pressure, returned energy",
+    summary="release from {p_from}: release time, residual pressure, returned energy",
     options=Options,
     defaults=Options(
         p_from=37e5, how="controlled", t_ramp=0.2, p_empty=0.5e5, duration=1.5, settle=1.0

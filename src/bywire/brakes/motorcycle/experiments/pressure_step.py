@@ -81,7 +81,8 @@ def settings(options: Options) -> dict[str, Any]:
 EXPERIMENT = Experiment(
     name="pressure-step",
     assembly="motorcycle-brake",
-    summary="current step of {i_step} from equilibrium at {p_start}, as in Fig. 6",
+    summary="current step of {i_step} from equilibrium at {p_start}, as in Fig. 6 of Dardanelli "
+    "et al.",
     options=Options,
     defaults=Options(
         p_start=25e5, start="settled", i_step=0.35, duration=4.0, settle=3.0, smoothing=0.02

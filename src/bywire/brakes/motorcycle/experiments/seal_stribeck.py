@@ -63,7 +63,7 @@ EXPERIMENT = Experiment(
     name="seal-stribeck",
     formerly="stribeck",
     assembly="motorcycle-brake",
-    summary="friction torque versus speed at {pressures} (Fig. 4)",
+    summary="friction torque versus speed at {pressures} (Fig. 4 of Dardanelli et al.)",
     options=Options,
     defaults=Options(pressures=(2e5, 20e5, 40e5), omega_max=2.0),
     cases=lambda *_: (),

@@ -303,11 +303,11 @@ class Options(ParameterSet):
     plant: Literal["brake", "eq-22"]
     """synthetic: the whole brake with friction, or a linear model exactly as in eq. (22)"""
     p_low: Pressure
-    """synthetic: mean pressure of the low region"""
+    """synthetic: mean pressure in the low-pressure region"""
     p_medium: Pressure
-    """synthetic: mean pressure of the medium region"""
+    """synthetic: mean pressure in the medium-pressure region"""
     p_high: Pressure
-    """synthetic: mean pressure of the high region"""
+    """synthetic: mean pressure in the high-pressure region"""
     i_step: Current
     """synthetic: step height"""
     amplitude: Current
@@ -500,7 +500,7 @@ def truth(par: MotorcycleParameters, options: Options) -> Mapping[str, float]:
 METHOD = Method(
     name="braking-dynamics",
     assembly="motorcycle-brake",
-    summary="transfer function from current to pressure by region (2010, eq. 22, Table 4, Fig. 6)",
+    summary="transfer function from current to pressure by region (Table 4 of Dardanelli et al.)",
     experiment="pressure-step",
     signals={"i": "A", "p_mc": "Pa"},
     options=Options,

@@ -87,7 +87,7 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
 METHOD = LOOP.method(
     name="current-loop",
     assembly="motorcycle-brake",
-    summary="gains of the current PI from steps with a locked rotor (2010, section 3.1, Fig. 3)",
+    summary="gains of the current PI from steps with a locked rotor (Fig. 3 of Dardanelli et al.)",
     experiment="current-step",
     options=Options,
     defaults=Options(

@@ -263,9 +263,9 @@ class Options(ParameterSet):
     """Definition of a slip, and noise of the measurements."""
 
     least: Pressure
-    """minimum pressure change that counts as a slip"""
+    """minimum pressure change to be treated as a slip"""
     longest: Duration
-    """maximum duration of each slip that the fit compares"""
+    """maximum duration of each slip in the fit"""
     scatter: Current
     """standard deviation of the breakaway current from slip to slip, in addition to measurement
     noise and ripple"""
@@ -475,7 +475,8 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
 METHOD = Method(
     name="friction-ramp",
     assembly="motorcycle-brake",
-    summary="seal friction from breakaway and slips on a slow ramp (2010, eqs. 16, 17, Fig. 4)",
+    summary="seal friction from breakaway and slips on a slow ramp (section 4.1 of Dardanelli et "
+    "al.)",
     experiment="friction-ramp",
     signals={"i": "A", "p_mc": "Pa"},
     options=Options,

@@ -32,7 +32,7 @@ from bywire.identification.unknown import parameters_of
 from bywire.simulation.run import simulate
 
 _NAMES = ("motor.R_m", "motor.L_m", "motor.K_e")
-_TURNS = 1.0  # rad/s: a slower shaft counts as locked
+_TURNS = 1.0  # rad/s: a slower shaft is treated as locked
 _STEP = 2e-6  # s, simulated experiment: a coarse step biases L_m if the shaft turns
 
 
@@ -146,7 +146,8 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
 METHOD = Method(
     name="motor-winding",
     assembly="motorcycle-brake",
-    summary="R_m and L_m from voltage steps, also K_e if the shaft turns (2010, eq. 1)",
+    summary="R_m and L_m from voltage steps, also K_e if the shaft turns (eq. (1) of Dardanelli "
+    "et al.)",
     experiment="motor-open-loop",
     signals={"v": "V", "omega": "rad/s", "i": "A"},
     options=Options,

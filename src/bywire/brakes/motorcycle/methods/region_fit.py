@@ -23,7 +23,7 @@ from bywire.identification.unknown import Unknown, moved
 
 Complex = NDArray[np.complex128]
 
-_LEAST = 0.1  # minimum height of a peak that counts as a line, relative to the strongest line
+_LEAST = 0.1  # minimum height of a peak that is treated as a line, relative to the strongest line
 _FINER = 4  # zero padding of the transform that detects the lines
 _ROUNDS = 5  # Newton iterations for their frequencies
 _STILL = 1e-9  # relative to a signal's magnitude: a smaller change is rounding
@@ -548,7 +548,8 @@ def _in_turn(
         best = _apart(problems, parts)
         notes.append(
             "the two-step fit did not converge: its last iteration changed the values by "
-            f"{change:.2g} of their size. Each step's intervals assume that the other step's "
+            f"{100.0 * change:.2g} % of their size. Each step's intervals assume that the other "
+            "step's "
             "values are exact"
         )
     return best.noted((*notes, *notes_of(best)))

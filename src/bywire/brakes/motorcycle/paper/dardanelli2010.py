@@ -142,11 +142,19 @@ NAMES = {
 }
 """titles of the parameter sets, keyed by the text after @ in an item's id"""
 
+_ADVICE = (
+    "Use the calibrated set, which is the default. Table 1 as printed is for comparison only. Tune "
+    "gains on the nonlinear model with dither, because gains that are tuned on Table 4's linear "
+    "models give a lower bandwidth on the brake. If the energy of a release matters, "
+    'use the gear with law = "directional".'
+)
 SOURCE = Source(
     name=MAIN,
     summary="electro-mechanical brake-by-wire actuator for a sport motorbike, IFAC 2010",
     reproduce=lambda progress: reproduced(
-        Reproduction(MAIN, CITATION, allowances=tuple(ALLOWANCES.values()), sets=NAMES),
+        Reproduction(
+            MAIN, CITATION, allowances=tuple(ALLOWANCES.values()), sets=NAMES, advice=_ADVICE
+        ),
         Runs(progress),
         PARTS,
         _causes,

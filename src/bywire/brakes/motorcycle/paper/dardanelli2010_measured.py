@@ -30,7 +30,7 @@ NAME = "dardanelli2010-measured"
 SETS = {NAME: "", MAIN: "@calibrated", PRINTED: "@table1"}
 """parameter sets, with the suffix of an item's id"""
 TITLES = {
-    "": "Estimated from these statements",
+    "": "Estimated from these published values",
     "calibrated": "Calibrated to Table 2",
     "table1": "Table 1 as printed",
 }
@@ -51,13 +51,13 @@ def statements(runs: Runs) -> Part:
     values |= dict(zip(others, predicted([parameters(name) for name in others]), strict=True))
     items = [_item(s, name, values[name][s.name]) for name in SETS for s in STATEMENTS]
     text = (
-        "Table 4, Figs. 5 to 7 and the friction of Table 3 count as measured on the real brake. "
-        "Tables 1 and 2 come from data sheets and theory, so they do not count. One fit estimates "
-        "all free parameters. It minimizes the sum of the soft_l1 losses of the residuals, "
-        "relative to their tolerances. The statements contradict each other, so squares would let "
-        "the largest residual dominate. Agreement with a statement proves nothing, because the "
-        "fit used it. Disagreement means that the statement contradicts the others, or that the "
-        "model's structure cannot reproduce it. Here the converter is ideal."
+        "We assume that Table 4, Figs. 5 to 7 and the friction in Table 3 were measured on the "
+        "real brake. Tables 1 and 2 come from data sheets and theory, so the fit does not use "
+        "them. One fit estimates all free parameters. It minimizes the sum of the soft_l1 losses "
+        "of the residuals, relative to their tolerances. The published values contradict each "
+        "other, so with squares the largest residual would dominate. Agreement with a value proves "
+        "nothing, because the fit used it. Disagreement means that the value contradicts the "
+        "others, or that the model's structure cannot reproduce it. Here the converter is ideal."
     )
     return Part(
         "Measurements",
@@ -128,10 +128,11 @@ def estimates(runs: Runs) -> Part:
     kept = [k.unknown.name for k in best.estimate.kept]
     text = (
         "The intervals treat the residuals as random, although most of them are contradictions. "
-        "They show how tightly the statements together constrain a value, not how certain the "
-        f"value is. No statement determines {' nor '.join(kept) or 'nothing'}, which stay at Table "
-        "1's values. In a product with a free parameter, such as A_mc k_g, the free parameter "
-        "stands for the whole product. A change of 1 % in any one parameter reduces the misfit by "
+        "They show how tightly the published values together constrain a parameter, not how "
+        "certain the parameter is. No published value determines "
+        f"{' or '.join(kept) or 'the others'}, which stay at Table 1's values. In a product with a "
+        "free parameter, such as A_mc k_g, the free parameter represents the whole product. A "
+        "change of 1 % in any one parameter reduces the misfit by "
         f"at most {100.0 * max(best.gain(), 0.0):.1g} %."
     )
     more = best.estimate.notes
@@ -206,7 +207,7 @@ def beyond(runs: Runs) -> Part:
         "ECU computes the dither, its steps hardly overshoot. At the height of Fig. 6 the "
         "overshoot equals Table 4's, but a slow pair is not its cause."
     )
-    return Part("Beyond the statements", text, items)
+    return Part("Beyond the published values", text, items)
 
 
 def _fast_pole(q: Quoted) -> RootCause:
@@ -286,12 +287,17 @@ def _stuck(q: Quoted) -> RootCause:
     )
 
 
+_ADVICE = (
+    "Use an estimate only together with its interval, and do not use one whose interval contains "
+    "zero or that is at its bound. Measure the parameters under 'Not determined' on your own "
+    "brake, because the paper's figures and tables do not determine them."
+)
 SOURCE = Source(
     name=NAME,
     summary="the motorcycle brake as measured: all parameters from Table 4, Figs. 5 to 7 and "
     "Table 3",
     reproduce=lambda progress: reproduced(
-        Reproduction(NAME, CITATION, allowances=allowances(), sets=TITLES),
+        Reproduction(NAME, CITATION, allowances=allowances(), sets=TITLES, advice=_ADVICE),
         Runs(progress),
         {"statements": statements, "estimate": estimates, "beyond": beyond},
         lambda items: causes_of(

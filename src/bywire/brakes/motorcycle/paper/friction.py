@@ -53,8 +53,8 @@ def table3(runs: Runs) -> Part:
             FACTS["fig4_top"],
             float(np.max(torque)),
             note="breakaway torque at 40 bar from Table 3 with the chosen T_pr = "
-            f"{par.seal.T_pr:g} N m; "
-            f"{bare:.3g} N m without T_pr. The curves do not come from the printed values",
+            f"{par.seal.T_pr:g} N·m; "
+            f"{bare:.3g} N·m without T_pr. The curves do not come from the printed values",
         ),
         compared(
             "fig4.bottom_tick",
@@ -162,7 +162,7 @@ def _identified_exhibit() -> Exhibit:
         "fig4-identified",
         lambda: method_curve(curve),
         "Fig. 4 as identified on our own brake from one ramp with sensor noise. Bands: 95 % "
-        f"confidence, at most {widest:.1g} N m on either side.",
+        f"confidence, at most {widest:.1g} N·m on either side.",
     )
 
 
@@ -170,7 +170,8 @@ def _identified_exhibit() -> Exhibit:
 
 _WITHOUT, _WITH = "without-dither", "with-dither"
 _REMOVED = 0.1
-"""width below which a loop counts as removed, relative to the undithered loop's at mid-height"""
+"""width below which a loop is treated as removed, relative to the undithered loop's at
+mid-height"""
 _SLOWER = 10.0
 """how many times slower than eq. (17) the slow ramp is"""
 _LEVELS = np.arange(ALLOWANCES["level"].size, 45.0, 0.1) * BAR
@@ -203,7 +204,7 @@ class _Loops:
 
     @property
     def removed_above(self) -> float:
-        """Pressure [bar] above which the dithered loop counts as removed."""
+        """Pressure [bar] above which the dithered loop is treated as removed."""
         setting = hysteresis.Setting("i_filtered", "p_mc", smoothing=0.02)
         loop = hysteresis.select(self.result.recordings[_WITH], setting)
         width = _REMOVED * self.values["loop_width_mid_undithered"]
@@ -306,7 +307,7 @@ def _set_items(name: str, suffix: str, loops: _Loops) -> list[Item]:
             f"fig5.loop_area_ratio.slow{suffix}",
             FACTS["fig5_loop"],
             slow,
-            note=f"the same on a ramp that is {_SLOWER:g} times slower: friction alone",
+            note=f"the same ratio on a ramp that is {_SLOWER:g} times slower: friction alone",
         ),
         compared(
             f"fig5.removed_above{suffix}",

@@ -403,7 +403,7 @@ FREE: Mapping[str, _Free] = {
     "seal.k_brk_p": _Free(1.0, 13.0, "Coulomb friction to five times Table 3"),
     "seal.k_brk_n": _Free(1.0, 11.5, "Coulomb friction to five times Table 3"),
     "seal.c": _Free(1.0, 25.0, _TABLE3),
-    "seal.mu_T": _Free(0.0, 2e-3, "zero to the text's 1e-2 N m s/rad, instead of Table 3's", 2e-7),
+    "seal.mu_T": _Free(0.0, 2e-3, "zero to the text's 1e-2 N·m·s/rad, instead of Table 3's", 2e-7),
     "ecu.filter.zeta": _Free(0.3, 1.5, "second-order low-pass filters in use"),
 }
 """parameters that the fit estimates together"""
@@ -423,8 +423,8 @@ HELD: Mapping[str, str] = {
     "caliper.A_pd": "acts only through A_pd^2/K_pd, which K_pd represents",
     "fluid.beta": "acts only through the chamber's volume/beta ratio, which s_mc represents",
     "pipeline.d_pl": "the misfit falls as the pipeline gets wider, until its resistance is "
-    "negligible and the misfit no longer depends on d_pl: the statements determine only a lower "
-    "bound",
+    "negligible and the misfit no longer depends on d_pl, so the published values determine only "
+    "a lower bound",
     "fluid.nu": "acts only through the pipeline's resistance, as d_pl does",
     "fluid.rho": "acts only through the pipeline's resistance, as d_pl does",
     "pipeline.L_pl": "acts only through the pipeline's resistance, as d_pl does",
@@ -613,13 +613,13 @@ def _sized(values: Array) -> tuple[Unknown, ...]:
     )
 
 
-# --- Uncertainty of a brake that counts as the best
+# --- Uncertainty of a brake that is treated as the best
 
 
 def appraised(par: Par) -> Appraisal:
     """Return the uncertainty of a brake's free parameters, which must minimize the misfit.
 
-    Parameters that the statements do not determine count as fixed at their values.
+    Parameters that the statements do not determine are treated as fixed at their values.
 
     Raises
     ------

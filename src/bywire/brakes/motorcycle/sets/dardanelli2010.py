@@ -24,7 +24,9 @@ _TABLE1 = next(entry for entry in _PUBLISHED if entry.name == "dardanelli2010-ta
 
 ESTIMATED = SourceFile(Path(__file__).with_name("dardanelli2010_measured.toml")).values()
 UNDETERMINED = ("master_cylinder.s_mc", "fluid.V_air", "seal.T_pr")
-_AS_TABLE1 = "as in dardanelli2010-table1: free in the estimation, but no statement determines it"
+_AS_TABLE1 = (
+    "as in dardanelli2010-table1: free in the estimation, but no published value determines it"
+)
 _ASSUMED = "the ECU assumes the estimated friction"
 _SEAL: dict[str, Formula] = {
     "f_cfr_p": lambda par: par.seal.f_cfr_p,
@@ -34,7 +36,7 @@ _MEASURED = CitedSet(
     name="dardanelli2010-measured",
     assembly=_TABLE1.assembly,
     source=_TABLE1.source,
-    summary="motorcycle brake, estimated from the paper's measurements: Table 4, Figs. 5 to 7",
+    summary="motorcycle brake, estimated from the measurements in Table 4 and Figs. 5 to 7",
     parameter_class=MotorcycleParameters,
     values={
         **_TABLE1.values,

@@ -366,7 +366,7 @@ class Options(ParameterSet):
     bandwidth: Frequency
     """required bandwidth: frequency of the sine, or bandwidth of the step response"""
     p_peak: Pressure
-    """maximum pressure: peak of the sine or end of the step"""
+    """maximum pressure: peak of the sine or final value of the step"""
     amplitude: Pressure
     """sine amplitude"""
     p_from: Pressure
@@ -414,7 +414,7 @@ SIZES = {
 
 
 _ROWS = 13  # gear ratios of the table
-_AT_EDGE = 1e-3  # relative distance from a limit of the range that counts as on the limit
+_AT_EDGE = 1e-3  # relative distance from a limit of the range that is treated as on the limit
 _SLOWEST, _FASTEST = 1e-2, 1e3  # search range for the highest bandwidth [Hz]
 _EXACT = 1e-12  # search tolerance for the logarithm of a ratio or bandwidth
 

@@ -49,12 +49,12 @@ ASSUMPTIONS = (
     "Each dither is tried on the nonlinear brake with a closed pressure loop, which approaches "
     "the set point from below and from above.",
     "The amplitude is the gain times the ECU's eqs. (18) and (19), so it follows the pressure.",
-    "Friction counts as overcome when the fraction of time stuck and the remaining dead band stay "
-    "within their limits, at this gain and at all higher gains. The remaining dead band is the "
-    "mean current from above minus that from below, relative to the band in which the piston may "
-    "rest.",
+    "Friction is considered overcome when the fraction of time stuck and the remaining dead band "
+    "stay within their limits at this gain and at all higher gains. The remaining dead band is the "
+    "mean current when approaching from above minus the mean current when approaching from below, "
+    "relative to the band in which the piston may rest.",
     "The cost is the copper loss in excess of the mean current's, averaged over the pressures. "
-    "Figures between two gains of the grid are interpolated.",
+    "Key figures between two gains of the grid are interpolated.",
     "Dither periods are even numbers of ECU sample times.",
     "The study neglects wear, noise, and heat in motor and seals.",
 )
@@ -78,13 +78,13 @@ class Options(ParameterSet):
     frequencies: Count
     """number of frequencies, approximately logarithmically spaced"""
     stuck_max: Fraction
-    """maximum fraction of time stuck"""
+    """maximum fraction of time during which the piston is stuck"""
     band_max: Fraction
     """maximum fraction of the dead band that may remain"""
     ripple_max: Pressure
     """maximum peak-to-peak ripple of the caliper pressure"""
     approach: Pressure
-    """distance from which the pressure loop approaches each pressure"""
+    """pressure difference from which the pressure loop approaches each pressure"""
     settle: Duration
     """time for the pressure loop to settle"""
     compare: Literal["waveforms", "none"]
@@ -398,7 +398,7 @@ def _warnings(
 STUDY = Study(
     name="dither",
     assembly="motorcycle-brake",
-    summary="amplitude and frequency of the cheapest dither that overcomes friction",
+    summary="amplitude and frequency of the lowest-loss dither that overcomes friction",
     options=Options,
     defaults=DEFAULTS,
     compute=compute,

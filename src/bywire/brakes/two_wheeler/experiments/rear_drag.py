@@ -16,7 +16,7 @@ from bywire.core.typing import Array
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
 
-_LEFT = 0.1  # fraction of the torque below which the brake counts as released
+_LEFT = 0.1  # fraction of the torque below which the brake is treated as released
 _END = 0.1  # s: averaging window at the end
 
 FIGURES = Figures(
@@ -95,7 +95,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="rear-drag",
     assembly="two-wheeler-whole-rear",
-    summary="residual drag after the rider releases the whole rear brake, from {v_0}",
+    summary="residual drag after the rider releases the by-wire rear brake, from {v_0}",
     options=Options,
     defaults=Options(v_0=20.0, p_rear=20e5, hold=0.5, surface="dry-asphalt", duration=2.0),
     cases=cases,

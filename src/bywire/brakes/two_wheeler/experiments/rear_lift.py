@@ -80,7 +80,7 @@ def _lift(run: xr.Dataset, off: np.ndarray) -> dict[str, float | tuple[float, st
 EXPERIMENT = Experiment(
     name="rear-lift",
     assembly="two-wheeler-by-wire",
-    summary="stop from {v_0} with only the front brake, {p_front}; lift control is a parameter",
+    summary="stop from {v_0} with only the front brake, {p_front} (lift control optional)",
     options=Options,
     defaults=Options(v_0=30.0, p_front=27e5, p_rate=60e5, grip=1.2, duration=1.5),
     cases=cases,

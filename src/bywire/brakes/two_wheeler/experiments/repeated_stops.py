@@ -155,7 +155,7 @@ class Options(ParameterSet):
     v_0: RidingSpeed
     """initial speed of each stop"""
     deceleration: Annotated[float, Unit("m/s**2", 8.0), Field(gt=0, allow_inf_nan=False)]
-    """deceleration from cold brakes, without drag and rolling resistance"""
+    """deceleration by cold brakes alone, without drag and rolling resistance"""
     share: Weight
     """fraction of the braking force from the front brake"""
     hold: Literal["pressure", "deceleration"]

@@ -108,7 +108,7 @@ def _shares(run: xr.Dataset) -> dict[str, float]:
 EXPERIMENT = Experiment(
     name="rider-trace",
     assembly="two-wheeler-by-wire",
-    summary="stop from {v_0} on {surface} with a rider trace, built-in or from stimuli",
+    summary="stop from {v_0} on {surface} with a built-in or measured trace of the rider's demand",
     options=Options,
     defaults=Options(v_0=30.0, surface="wet-asphalt", duration=8.0),
     cases=cases,

@@ -16,6 +16,7 @@ from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array
+from bywire.core.units import shown
 from bywire.plant import road, two_wheeler_body
 from bywire.plant.road import Gradient
 from bywire.vehicle.ideal_stop import RidingSpeed
@@ -162,7 +163,8 @@ def slope_hold(
 ) -> tuple[Case, ...]:
     """Return the single run."""
     if not options.t_release < options.duration:
-        release, end = f"{options.t_release:g} s", f"< options.duration = {options.duration:g} s"
+        release = shown(options.t_release, "s")
+        end = f"< options.duration = {shown(options.duration, 's')}"
         raise not_valid(
             "options.t_release", release, end, "because the recording must contain the release"
         )

@@ -83,7 +83,8 @@ def straight_stop(
 STRAIGHT_STOP = Experiment(
     name="straight-stop",
     assembly="two-wheeler-by-wire",
-    summary="panic stop from {v_0:km/h} with {p_front} front and {p_rear} rear, on {surface}",
+    summary="panic stop from {v_0:km/h} with {p_front} at the front and {p_rear} at the rear, on "
+    "{surface}",
     options=StraightStopOptions,
     defaults=StraightStopOptions(
         v_0=100.0 / 3.6, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0
@@ -134,7 +135,7 @@ def actuator_effort(run: xr.Dataset, _: StraightStopOptions) -> tuple[Kpi, ...]:
 WHOLE_REAR_STOP = Experiment(
     name="whole-rear-stop",
     assembly="two-wheeler-whole-rear",
-    summary="panic stop with a whole brake by wire at the rear wheel, {p_rear}",
+    summary="panic stop with the complete by-wire rear brake, {p_rear}",
     options=StraightStopOptions,
     defaults=StraightStopOptions(
         v_0=30.0, p_front=40e5, p_rear=40e5, surface="wet-asphalt", duration=0.0
@@ -163,7 +164,7 @@ class BandwidthsOptions(PanicOptions):
     surface: SurfaceName
     """road surface"""
     f_n: Annotated[Nodes, Unit("Hz", 10.0), Field(min_length=1)]
-    """natural frequencies of the pressure loops, one run each"""
+    """natural frequencies of the pressure loops, with one run for each"""
     duration: Duration
     """recording time"""
 
@@ -220,7 +221,7 @@ _BANDWIDTHS = BandwidthsOptions(
 BANDWIDTHS = Experiment(
     name="bandwidths",
     assembly="two-wheeler-by-wire",
-    summary="controlled stops from {v_0} on {surface} with pressure loops of {f_n}",
+    summary="controlled stops from {v_0} on {surface} with pressure-loop bandwidths of {f_n}",
     options=BandwidthsOptions,
     defaults=_BANDWIDTHS,
     cases=bandwidths,

@@ -61,7 +61,7 @@ class Memory(NamedTuple):
     ]
     slip_hat: Annotated[float, Signal("1", "measured slip", 0.1)]
     slip_ref: Annotated[float, Signal("1", "slip set point", 0.1, set_point_of="slip")]
-    integral: Annotated[float, Signal("Pa", "integral part", 2e6)]
+    integral: Annotated[float, Signal("Pa", "integral term", 2e6)]
     acts: Annotated[float, Signal("1", "slip control is active")]
 
 
@@ -83,7 +83,7 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
     E_brake = Integral("J", "brake and rolling resistance", role=Role("sink", "brake"))
 
     F = Wire("N", "braking force of the tire", 1e3)
-    T = Wire("N*m", "torque that brake and rolling resistance can hold", 300.0)
+    T = Wire("N*m", "torque that the brake and the rolling resistance can hold", 300.0)
     slip = Shown("1", "braking slip", 0.1)
 
     def wire(self, w: Self) -> None:

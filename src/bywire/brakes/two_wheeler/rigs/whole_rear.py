@@ -1,4 +1,4 @@
-"""The two-wheeler with the whole brake by wire of Dardanelli et al. (2010) at its rear wheel.
+"""The two-wheeler with the complete by-wire brake of Dardanelli et al. (2010) at its rear wheel.
 
 The model of the front brake is only its pressure loop. The rear brake is complete: battery, motor,
 screw, cylinder, line, caliper, and an ECU with dither. Its ECU follows the rider's demand after

@@ -66,7 +66,7 @@ FRONT600 = CitedSet(
             for name, value in SPORT600.values.items()
             if name.startswith(f"{there}.")
         },
-        "drum.v": chosen(20.0, "middle of a stop"),
+        "drum.v": chosen(20.0, "speed in the middle of a stop"),
         "drum.N": chosen(2200.0, "front wheel load during a full stop on wet asphalt"),
         **{
             f"drum.surface.{name}": derived(

@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     mu_B: Gain
     """coefficient of friction between pads and disc"""
     k_return: SpringRate
-    """stiffness of the return spring toward the middle; 0 without a spring"""
+    """stiffness of the spring that centers the wedge; 0 without a spring"""
     x_stop: Length
     """wedge travel to the end stop on either side"""
 

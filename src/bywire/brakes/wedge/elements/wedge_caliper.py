@@ -13,6 +13,7 @@ from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Length, Nodes, Stiffness, TimeConstant, Unit
 from bywire.core.signals import ContactCompliance, Energy, Overlap, Role, Signal
+from bywire.core.units import shown
 
 Clearance = Annotated[float, Unit("m", 2e-4), Field(ge=0, allow_inf_nan=False)]
 Work = Annotated[float, Signal("W", "work on the caliper")]
@@ -78,12 +79,14 @@ def _require_rising(name: str, unit: str, nodes: Nodes) -> None:
     if len(nodes) < 2:
         raise RuleError(name, f"{len(nodes)} nodes", "of 2 nodes or more")
     if nodes[0] != 0.0:
-        raise RuleError(f"{name}.0", f"{nodes[0]:g} {unit}", f"0 {unit}, the start of the curve")
+        raise RuleError(
+            f"{name}.0", shown(nodes[0], unit), f"{shown(0.0, unit)}, the start of the curve"
+        )
     for k, (a, b) in enumerate(pairwise(nodes), 1):
         if b <= a:
             reason = "sort the nodes, and omit nodes where the curve does not rise"
             raise RuleError(
-                f"{name}.{k}", f"{b:g} {unit}", f"> {a:g} {unit}, the previous node", reason
+                f"{name}.{k}", shown(b, unit), f"> {shown(a, unit)}, the previous node", reason
             )
 
 

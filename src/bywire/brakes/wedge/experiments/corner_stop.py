@@ -16,9 +16,8 @@ from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner, WedgeCornerParameters, at_speed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Temperature
-from bywire.plant import adhesion, road
 from bywire.plant.road import SurfaceName
-from bywire.vehicle.ideal_stop import RidingSpeed
+from bywire.vehicle.ideal_stop import RidingSpeed, ideal_corner_distance
 from bywire.vehicle.surfaces import laid
 
 
@@ -210,19 +209,10 @@ def _at_the_end(run: xr.Dataset, end: float, v_0: float) -> dict[str, float]:
     par = WedgeCornerParameters.model_validate_json(run.attrs["parameters"])
     return {
         "stopping_distance": distance,
-        "braking_efficiency": 100.0 * _ideal(v_0, par) / distance,
+        "braking_efficiency": 100.0 * ideal_corner_distance(v_0, par.corner) / distance,
         "supply_energy": spent("W_supply"),
         "disc_energy": spent("E_brake"),
     }
-
-
-def _ideal(v_0: float, par: WedgeCornerParameters) -> float:
-    """Return the shortest stopping distance [m], with the tire at its peak from the demand on."""
-    corner = par.corner
-    ground, slope = road.surface(0.0, corner.road), road.slope(0.0, corner.road)
-    mu = adhesion.adhesion(adhesion.peak_slip(ground, corner.tyre), ground, corner.tyre)
-    a = corner.body.g * (mu * slope.cosine + slope.sine)
-    return v_0 * v_0 / (2.0 * a) if a > 0 else math.inf
 
 
 CORNER_PANIC = Experiment(

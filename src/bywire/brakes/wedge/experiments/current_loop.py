@@ -39,7 +39,7 @@ class Options(ParameterSet):
     windings: ThreeFactors
     """resistance and inductance relative to the parameter set: parallel, single, series"""
     gains: ThreeFactors
-    """current controller gains relative to the parameter set: soft, usual, sharp"""
+    """current controller gains relative to the parameter set: low, nominal, high"""
     duration: Duration
     """recording time after the step"""
     record: Duration

@@ -137,7 +137,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="disc-stop",
     assembly="wedge-brake",
-    summary="{M_brake} until the disc stops, hold, release; two models of a stopped disc",
+    summary="braking to a stop with {M_brake}, hold and release, with two models of a stopped disc",
     options=Options,
     defaults=Options(M_brake=300.0, Omega_0=5.0, t_hold=1.5, t_end=0.3, settle=0.05),
     cases=cases,

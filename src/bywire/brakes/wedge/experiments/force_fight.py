@@ -42,13 +42,13 @@ class Options(ParameterSet):
     f_sine: Frequency
     """frequency of the sine"""
     more_K: Share
-    """torque constant of motor 2 relative to the parameter set, minus one"""
+    """relative deviation of motor 2's torque constant from the parameter set"""
     more_J: Share
-    """inertia of motor 2 relative to the parameter set, minus one"""
+    """relative deviation of motor 2's inertia from the parameter set"""
     more_R: Share
-    """resistance of motor 2 relative to the parameter set, minus one"""
+    """relative deviation of motor 2's resistance from the parameter set"""
     more_D: Share
-    """viscous damping of motor 2 relative to the parameter set, minus one"""
+    """relative deviation of motor 2's viscous damping from the parameter set"""
     duration: Duration
     """recording time of each motion"""
     record: Duration

@@ -166,7 +166,8 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="friction-sweep",
     assembly="wedge-brake",
-    summary="{M_step} steps at pad friction {mu_B}: stability, overshoot, settling, hold power",
+    summary="{M_step} steps at pad friction coefficients of {mu_B}: stability, overshoot, "
+    "settling, hold power",
     options=Options,
     defaults=_DEFAULTS,
     cases=cases,

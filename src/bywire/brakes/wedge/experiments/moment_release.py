@@ -92,7 +92,9 @@ def judge_release(recordings: Recordings, options: ReleaseOptions) -> tuple[Kpi,
     end = float(run["x"].values[-1])
     until = run.sel(time=slice(None, home.value)) if parked is not None else run
     energy = float(until["W_supply"].values[-1] - until["W_supply"].values[0])
-    not_parked = "the brake is not parked, so the energy counts until the end of the recording"
+    not_parked = (
+        "the brake is not parked, so the energy includes everything until the end of the recording"
+    )
     counted = "" if parked is not None else not_parked
     return (
         *FALL(moment_start=run["M_B"].values[0], time_to_5=_fall(run)),

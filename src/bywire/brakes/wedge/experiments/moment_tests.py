@@ -215,7 +215,7 @@ def _pulse(run: xr.Dataset, options: PulsesOptions) -> tuple[float, str]:
 MOMENT_PULSES = Experiment(
     name="moment-pulses",
     assembly="wedge-brake",
-    summary="moment step to {M_high}, then pulses to {low:%} (Fig. 7)",
+    summary="moment step to {M_high}, then pulses to {low:%} (Fig. 7 of Roberts et al.)",
     options=PulsesOptions,
     defaults=PulsesOptions(
         M_high=200.0, low=0.8, t_hold=0.5, t_low=0.2, t_high=0.2, pulses=3, settle=0.05
@@ -316,7 +316,8 @@ def _followed(run: xr.Dataset, begin: float, end: float) -> tuple[float, float, 
 MOMENT_RAMP = Experiment(
     name="moment-ramp",
     assembly="wedge-brake",
-    summary="moment step to {M_high}, reduction to {M_low}, slow ramp back (Fig. 8)",
+    summary="moment step to {M_high}, reduction to {M_low}, slow ramp back (Fig. 8 of Roberts et "
+    "al.)",
     options=RampOptions,
     defaults=RampOptions(
         M_high=200.0, M_low=160.0, t_hold=0.5, t_low=0.3, t_ramp=1.0, t_end=0.3, settle=0.05
@@ -384,7 +385,7 @@ def judge_large_pulse(recordings: Recordings, options: LargePulseOptions) -> tup
 MOMENT_PULSE_950 = Experiment(
     name="moment-pulse-950",
     assembly="wedge-brake",
-    summary="moment pulse of {M_high} at the software rate limit (Fig. 9)",
+    summary="moment pulse of {M_high} at the software rate limit (Fig. 9 of Roberts et al.)",
     options=LargePulseOptions,
     defaults=LargePulseOptions(M_high=950.0, t_pulse=0.2, t_end=0.3, omega_gap=60.0, settle=0.05),
     cases=large_pulse,

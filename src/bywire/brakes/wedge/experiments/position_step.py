@@ -213,7 +213,8 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="position-step",
     assembly="wedge-brake",
-    summary="steps of both motors within the clearance, two bandwidths, with and without the wedge",
+    summary="steps of both motors within the clearance at two bandwidths, with and without the "
+    "wedge",
     options=Options,
     defaults=_DEFAULTS,
     cases=cases,

@@ -19,7 +19,7 @@ from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.plant.axial_bearing import AngularSpeed
 
-_STARTED = 0.05  # fraction of a stroke after which the motion counts as steady
+_STARTED = 0.05  # fraction of a stroke after which the motion is treated as steady
 FIGURES = Figures(
     torque_forward=("N*m", "Mean torque from the current, forward."),
     torque_backward=("N*m", "Mean torque from the current, backward."),

@@ -95,7 +95,8 @@ def stiffness(
     sensor, so friction has no effect. Stage 2 has no force sensor. There the force comes from the
     current and a calibration from stage 1, which includes the friction at rising current. The
     evaluation assumes symmetry, like the paper. Unequal motors drag the wedge along, and its
-    friction then counts as stiffness (K_W is 5 % too high if the torque constants differ by 10 %).
+    friction is then treated as stiffness (K_W is 5 % too high if the torque constants differ by 10
+    %).
     """
     check_current("i_max", options.i_max, par)
     t = options.t_ramp

@@ -1,4 +1,4 @@
-"""Moment control of a wedge brake: parked, gap crossing, moment, retracting.
+"""Moment control of a wedge brake, with modes for parking, gap crossing, moment and retracting.
 
 The control uses the angle toward clamping, so both directions of rotation are the same. Its output
 is the speed of the common angle reference, which the faster position task integrates.
@@ -48,7 +48,7 @@ class Parameters(ParameterSet):
     M_on: SomeMoment
     """minimum moment demand at which the brake leaves its parking position"""
     M_contact: SomeMoment
-    """minimum measured moment that counts as contact, the threshold of the gap mode"""
+    """minimum measured moment that indicates contact, the threshold of the gap mode"""
     Omega_still: SpeedLimit
     """disc speed below which the control does not use the moment sensor"""
 

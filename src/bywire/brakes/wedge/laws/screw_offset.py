@@ -1,4 +1,4 @@
-"""Offset between the two screws, which squeeze the wedge without free play or push it together."""
+"""Offset between the two screws, which squeeze the wedge without free play or push it jointly."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from bywire.core import ops
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Force, GearRatio, Position
 from bywire.core.signals import Signal
+from bywire.core.units import shown
 
 SampleTime = Annotated[float, Signal("s", "sample time", 2e-4), Gt(0)]
 ScrewTravel = Annotated[float, Signal("m", "offset of each screw", 4e-5)]
@@ -41,7 +42,9 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
         if not self.F_low < self.F_high:
-            raise RuleError("F_low", f"{self.F_low:g} N", f"below F_high = {self.F_high:g} N")
+            raise RuleError(
+                "F_low", shown(self.F_low, "N"), f"below F_high = {shown(self.F_high, 'N')}"
+            )
         return self
 
 

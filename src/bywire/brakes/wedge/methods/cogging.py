@@ -244,11 +244,11 @@ class Options(ParameterSet):
     cutoff: Frequency
     """cutoff frequency of the filter for torque and angle; must be above the cogging frequency"""
     slowest: AngularSpeed
-    """speed below which the shaft counts as reversing"""
+    """speed below which the shaft is considered to reverse"""
     margin: Duration
     """time to omit at the start and end of each motion"""
     highest: Annotated[int, Unit("1", 400.0), Field(ge=1, le=10000)]
-    """maximum order per revolution in the search"""
+    """maximum cogging order per revolution in the search"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
     """current noise in synthetic measurements"""
 

@@ -68,7 +68,7 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
 METHOD = LOOP.method(
     name="drive-current-loop",
     assembly="wedge-brake",
-    summary="current-loop gains of a drive from steps with the motor clamped (2003)",
+    summary="current-loop gains of a drive from steps with the motor clamped, as in Roberts et al.",
     experiment="current-loop",
     options=Options,
     defaults=Options(

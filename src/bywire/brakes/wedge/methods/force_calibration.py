@@ -48,7 +48,7 @@ class RigOptions(ParameterSet):
     cutoff: Frequency
     """cutoff frequency of the low-pass filter for the speed"""
     slowest: AngularSpeed
-    """minimum relative speed of the two motors that counts as motion"""
+    """relative speed of the two motors above which they are considered moving"""
     margin: Duration
     """time to omit at the start and end of each motion"""
     window: Duration
@@ -69,10 +69,10 @@ def drive_sensors(options: RigOptions) -> dict[str, Sensor]:
 # --- Cogging of two motors that squeeze a force between their screws
 
 _WAVES = {
-    "cos": "cogging of known order versus the relative angle of the motors, cosine",
-    "sin": "cogging of known order versus the relative angle of the motors, sine",
-    "cos_drift": "effect of both motors drifting in the same direction, cosine",
-    "sin_drift": "effect of both motors drifting in the same direction, sine",
+    "cos": "cogging of known order versus the relative angle of the motors, cosine coefficient",
+    "sin": "cogging of known order versus the relative angle of the motors, sine coefficient",
+    "cos_drift": "effect of both motors drifting in the same direction, cosine coefficient",
+    "sin_drift": "effect of both motors drifting in the same direction, sine coefficient",
 }
 
 

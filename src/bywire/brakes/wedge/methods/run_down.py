@@ -65,7 +65,7 @@ class RunDown:
 
 
 def _read_run(label: str, data: xr.Dataset, par: WedgeParameters, options: Options) -> RunDown:
-    """Return a record's motion. An inertia added to the shaft counts as part of the dummy."""
+    """Return a record's motion. An inertia added to the shaft is treated as part of the dummy."""
     seen = data.rename({"q_1": "theta", "i_1": "i"})
     moved = differentiated(seen[["theta", "i"]], "theta", ("omega", "alpha"), options.cutoff)
     moved["F"] = ("time", np.zeros(moved.sizes["time"]), {"units": "N"})
@@ -150,7 +150,7 @@ class Options(ParameterSet):
     """Part of a run-down that counts, filter, and the synthetic noise."""
 
     slowest: AngularSpeed
-    """minimum speed; below it cogging and the Stribeck effect dominate"""
+    """minimum speed, below which cogging and the Stribeck effect dominate"""
     margin: Duration
     """time to omit at the start and end of each coasting phase"""
     window: Duration

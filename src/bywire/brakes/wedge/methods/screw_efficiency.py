@@ -233,8 +233,9 @@ def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
                 raise wrong_sign(
                     f"i_{side}",
                     "y_F",
-                    f"with the motion of q_{side}, the screw would gain {-least:.3g} N*m while "
-                    f"{word}, unless q_{side} is from the wrong shaft",
+                    f"if q_{side} is from the right shaft, the screw would add {-least:.3g} N*m "
+                    "while "
+                    f"{word}",
                 )
 
 

@@ -50,7 +50,7 @@ _SENSOR, _HEART, _LOOP = slice(11, 15), slice(15, 19), 19
 MEANINGS: Mapping[str, tuple[str, str]] = {
     "zero_of_travel": ("m", "travel at which no force acts on the sensor, d_0"),
     "tips_touch": ("m", "travel at which the tips touch, d_c"),
-    "free_play": ("m", "travel from there to the pull on the wedge, d_c - d_t"),
+    "free_play": ("m", "travel from that position to the pull on the wedge, d_c - d_t"),
     **force_calibration.LAW_MEANINGS,
     **force_calibration.cogging_meanings("sensor"),
     **force_calibration.cogging_meanings("heart"),

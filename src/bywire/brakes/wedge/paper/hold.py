@@ -36,7 +36,7 @@ def part(runs: Runs) -> Part:
     exhibit = Exhibit(
         "power-off-hold",
         lambda: stacked(run),
-        "Power off at 500 Nm. Only the ripple due to runout remains.",
+        "Power off at 500 N·m. Only the ripple due to runout remains.",
     )
     return Part("Holding", text, tuple(items), (exhibit,), {"power-off-hold": run})
 
@@ -55,14 +55,15 @@ def _power_off(runs: Runs) -> list[Item]:
             "hold.neutral",
             FACTS["remains"],
             _share(kept),
-            note="moment 2 s after power-off, in % of the moment before. Runout off, friction on",
+            note="moment 2 s after power-off, in % of the moment before power-off, without "
+            "runout and with friction",
         ),
         compared(
             "hold.drift",
             still,
             usual["drift"],
             "<=",
-            "change in wedge travel in the 2 s after all bodies stick, runout on",
+            "change in wedge travel in the 2 s after all bodies stick, with runout",
         ),
         found(
             "hold.relaxation",
@@ -102,7 +103,7 @@ def _standing(runs: Runs) -> list[Item]:
             "hold.standing.stick",
             "1",
             shares["stick"],
-            "the same ratio if the pad sticks to the stopped disc (our other reading)",
+            "the same ratio if the pad sticks to the stopped disc (our other interpretation)",
         ),
         found(
             "hold.force_held",
@@ -135,7 +136,7 @@ def _together(runs: Runs) -> list[Item]:
             "hold.together",
             FACTS["together"],
             above["scheduled"] / above["preload"],
-            note=f"500 Nm at mu_B = {_AWAY:g}: {above['scheduled']:.3g} W if the motors work "
+            note=f"500 N·m at mu_B = {_AWAY:g}: {above['scheduled']:.3g} W if the motors work "
             f"together, {above['preload']:.3g} W with preload",
         ),
     ]

@@ -46,7 +46,7 @@ def fig7(runs: Runs) -> Part:
     exhibit = Exhibit(
         "fig7",
         lambda: stacked(result.recordings["run"]),
-        "Fig. 7: 200 Nm moment step with pulses, demand and simulation.",
+        "Fig. 7: 200 N·m moment step with pulses, demand and simulation.",
     )
     return Part(
         "Figure 7: step and pulses",
@@ -190,7 +190,7 @@ def _hold_power(result: Result) -> list[Item]:
             "fig7.standby",
             FACTS["standby"],
             100.0 * standby() / holding,
-            note="the standby power is tuned to the 60 W of Fig. 9",
+            note="we tuned the standby power to match the 60 W of Fig. 9",
             tuned="calibrated",
         ),
         found("fig7.power_peak", "W", values["peak_power"], "at the drives' input, unfiltered"),
@@ -272,7 +272,7 @@ def fig8(runs: Runs) -> Part:
     exhibit = Exhibit(
         "fig8",
         lambda: stacked(result.recordings["run"]),
-        "Fig. 8: 200 Nm moment step with a ramp, demand and simulation.",
+        "Fig. 8: 200 N·m moment step with a ramp, demand and simulation.",
     )
     return Part(
         "Figure 8: step and ramp",
@@ -298,7 +298,7 @@ def _items(result: Result) -> list[Item]:
             "fig8.low_moment",
             FACTS["lowered"],
             settled(run, "M_B", lowered),
-            note="mean over the last revolution at 160 Nm",
+            note="mean over the last revolution at 160 N·m",
         ),
         compared(
             "fig8.final_moment",
@@ -354,7 +354,7 @@ def fig9(runs: Runs) -> Part:
     )
     run = result.recordings["run"]
     exhibit = Exhibit(
-        "fig9", lambda: stacked(run), "Fig. 9: 950 Nm moment pulse, demand and simulation."
+        "fig9", lambda: stacked(run), "Fig. 9: 950 N·m moment pulse, demand and simulation."
     )
     return Part("Figure 9: large pulse", text, tuple(items), (exhibit,), {"fig9": run})
 
@@ -413,7 +413,7 @@ def _limits(runs: Runs, result: Result) -> list[Item]:
             "fig9.rate_limited",
             FACTS["long"],
             build_up,
-            note="we tuned the limit of 60 rad/s to the power",
+            note="we tuned the limit of 60 rad/s to match the power",
         ),
         found(
             "fig9.rate_limited_pulse",
@@ -425,14 +425,14 @@ def _limits(runs: Runs, result: Result) -> list[Item]:
             "fig9.limits_dominate",
             FACTS["large_limited"],
             whole - whole_small,
-            note=f"fraction at 950 Nm minus the fraction at 200 Nm ({whole_small:.3g} %)",
+            note=f"fraction at 950 N·m minus the fraction at 200 N·m ({whole_small:.3g} %)",
         ),
         compared(
             "fig9.friction_dominates",
             FACTS["small_friction"],
             at_200 / at_950,
             note=f"effect of friction on the moment, root mean square over {_FIRST:g} s: "
-            f"{100 * at_200:.3g} % of 200 Nm, {100 * at_950:.3g} % of 950 Nm",
+            f"{100 * at_200:.3g} % of 200 N·m, {100 * at_950:.3g} % of 950 N·m",
         ),
     ]
 
@@ -464,7 +464,8 @@ def _pulse_power(runs: Runs, result: Result) -> list[Item]:
             "fig9.power",
             FACTS["power"],
             peak(run, "P_meas"),
-            note="maximum filtered power. Standby, filter and rate limit are tuned to it",
+            note="maximum filtered power. We tuned the standby power, the filter and the rate "
+            "limit to match this value",
             tuned="calibrated",
         ),
         compared(
@@ -491,7 +492,7 @@ def _pulse_power(runs: Runs, result: Result) -> list[Item]:
             steady / late,
             note=f"{steady:.3g} W after {_LONGER:g} s, {late:.3g} W at the end of the pulse",
         ),
-        found("fig9.steady_power", "W", steady, "above standby, last revolution of 1 s at 950 Nm"),
+        found("fig9.steady_power", "W", steady, "above standby, last revolution of 1 s at 950 N·m"),
     ]
 
 
@@ -511,7 +512,7 @@ def _tail(runs: Runs) -> list[Item]:
     )
     times = [_switches(result.recordings["run"]) for result in (low, high)]
     parking = [kpis(result)["parking_time"] for result in (low, high)]
-    between = f"between thresholds of {_THRESHOLDS[0]:g} and {_THRESHOLDS[1]:g} Nm"
+    between = f"between thresholds of {_THRESHOLDS[0]:g} and {_THRESHOLDS[1]:g} N·m"
     why = "the paper attributes its deviation at the end of Fig. 9 to the time of this switch"
     return [
         found(

@@ -58,7 +58,7 @@ def efficiency(runs: Runs) -> Part:
     result = runs.bench("screw-efficiency", MAIN)
     values = {name: 100.0 * value for name, value in kpis(result).items() if "eta" in name}
     put_in = replace(FACTS["measurable"], value=values["eta_f_true"])
-    bearing = f"{kpis(result)['bearing_torque']:.3g} N m"
+    bearing = f"{kpis(result)['bearing_torque']:.3g} N·m"
     items = [
         compared(
             "efficiency.driving",
@@ -79,7 +79,7 @@ def efficiency(runs: Runs) -> Part:
             put_in,
             values["eta_f_no_load"],
             note="after subtracting only the no-load bearing torque. Friction that grows with the "
-            "force squared then counts as screw loss",
+            "force squared is then included in the screw loss",
         ),
         compared(
             "efficiency.raw", put_in, values["eta_f_raw"], note="motor torque and force alone"
@@ -251,7 +251,7 @@ def force_fight(runs: Runs) -> Part:
         "Both motors follow one reference, with a force sensor between their screws. The paper "
         "prints no forces. It says that the rate limit is needed because higher speeds widen the "
         "angle between the motors. The pulse of Fig. 9 with a weaker second motor tests this "
-        "statement."
+        "claim."
     )
     exhibit = Exhibit(
         "force-fight",

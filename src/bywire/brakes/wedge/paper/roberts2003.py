@@ -24,12 +24,22 @@ PARTS = {
     "holding": hold.part,
 }
 
+_ADVICE = (
+    "The disagreements come from friction and from values that the paper does not print, such as "
+    "the preload and the length of a pulse, and not from its equations. Responses to large steps, "
+    "hold powers and moments are suitable for studies. Vary the preload and the friction if your "
+    "result depends on small motions or on the position at which a shaft comes to rest."
+)
 SOURCE = Source(
     name=MAIN,
     summary="self-reinforcing wedge brake with two motors, SAE 2003",
     reproduce=lambda progress: reproduced(
         Reproduction(
-            MAIN, CITATION, allowances=tuple(ALLOWANCES.values()), sets={"": "Our parameter set"}
+            MAIN,
+            CITATION,
+            allowances=tuple(ALLOWANCES.values()),
+            sets={"": "Our parameter set"},
+            advice=_ADVICE,
         ),
         Runs(progress),
         PARTS,
@@ -55,8 +65,8 @@ def _neutral_band(q: Quoted) -> RootCause:
         f"friction the brake runs away above {q('stability.runaway')} "
         f"({q.stated('stability.runaway')} stated). Dry friction in bearings, "
         "screws and wedge holds the brake without power below "
-        f"{q('stability.runaway.friction')} at 500 Nm and "
-        f"{q('stability.runaway.friction.950')} at 950 Nm.",
+        f"{q('stability.runaway.friction')} at 500 N·m and "
+        f"{q('stability.runaway.friction.950')} at 950 N·m.",
         ("stability.runaway.friction",),
     )
 

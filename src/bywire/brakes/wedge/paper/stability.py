@@ -34,7 +34,7 @@ _TRIED = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
 _LOWEST, _HIGHEST = 0.32, 0.62
 """bounds of the search for the lowest coefficient at which the brake runs away"""
 _GROWN = 1.05
-"""ratio to the moment at power-off above which the brake counts as having run away"""
+"""ratio to the moment at power-off above which the brake is treated as having run away"""
 _VARIANTS = (
     ("", "fixed", "kept"),
     (".frictionless", "fixed", "none"),
@@ -93,7 +93,7 @@ def _static(runs: Runs) -> list[Item]:
                 ALLOWANCES["formula"],
                 f"mu_B = {mu_B:g}, simulated "
                 f"without friction, F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 "
-                f"Nm. With friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
+                f"N·m. With friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
                 f"rising, {values[f'C_star_falling_{tag(mu_B)}']:.3g} falling",
             )
         )
@@ -104,7 +104,7 @@ def _static(runs: Runs) -> list[Item]:
             "stability.F_M.neutral",
             FACTS["neutral_force"],
             values[f"F_M_{tag(tan_alpha())}"],
-            note="simulated at mu_B = tan(alpha) without friction, at 500 Nm",
+            note="simulated at mu_B = tan(alpha) without friction, at 500 N·m",
         ),
         found("stability.neutral.falling", "1", values["neutral_mu_falling"], f"{neutral} falls"),
         found("stability.neutral.rising", "1", values["neutral_mu_rising"], f"{neutral} rises"),
@@ -129,7 +129,7 @@ def _figure(runs: Runs) -> Exhibit:
     return Exhibit(
         "brake-factor",
         lambda: brake_factor(forces, tan_alpha()),
-        "Actuation force and brake factor at 500 Nm versus pad friction coefficient.",
+        "Actuation force and brake factor at 500 N·m versus pad friction coefficient.",
     )
 
 
@@ -145,20 +145,20 @@ def _runaway(runs: Runs) -> list[Item]:
             stated,
             _lowest(runs, IDEAL, 500.0),
             ALLOWANCES["grid"],
-            f"{note} 500 Nm, without friction",
+            f"{note} 500 N·m, without friction",
         ),
         compared(
             "stability.runaway.friction",
             stated,
             _lowest(runs, {"flywheel.runout": 0.0}, 500.0),
             ALLOWANCES["grid"],
-            f"{note} 500 Nm, with friction",
+            f"{note} 500 N·m, with friction",
         ),
         found(
             "stability.runaway.friction.950",
             "1",
             _lowest(runs, {"flywheel.runout": 0.0}, high),
-            f"{note} {high:g} Nm, with friction",
+            f"{note} {high:g} N·m, with friction",
         ),
     ]
 
@@ -192,7 +192,7 @@ def _closed_loop(runs: Runs) -> list[Item]:
             runs.bench("friction-sweep", MAIN, None, {"slope": slope, "friction": friction})
         )
         belief = "knows" if slope == "known" else "does not know"
-        note = f"200 Nm, friction {friction}. The controller {belief} mu_B"
+        note = f"200 N·m, friction {friction}. The controller {belief} mu_B"
         items += [
             compared(
                 f"stability.unstable{suffix}",

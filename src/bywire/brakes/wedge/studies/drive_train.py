@@ -71,7 +71,7 @@ class Demand:
         Whether the speed of the reference enforces the time. Otherwise the pads close as fast as
         in the given brake.
     whole
-        Whether the power of the release also counts, in addition to build-up and hold.
+        Whether the peak power includes the release, in addition to build-up and hold.
     phases
         Disc angles [rad] at which the runs begin.
     """
@@ -353,7 +353,8 @@ _ASSUMPTIONS = (
     "response), does not hold 95 % of the demand, does not release, or presses on an end stop.",
     "Power is the power at the drives' input, including standby, during build-up and hold, and "
     "optionally during the release.",
-    "Each case runs with the disc at four angles, a quarter turn apart, and the worst one counts. "
+    "Each case runs with the disc at four angles, a quarter turn apart, and the worst result is "
+    "used. "
     "The phase of the runout at the stop is random, and holding the moment against the runout "
     "needs power.",
 )
@@ -371,11 +372,11 @@ class Options(ParameterSet):
     t_release: Duration
     """time within which the brake must release after the demand"""
     counted: Literal["build-up-and-hold", "whole-pulse"]
-    """whether the power of the release also counts"""
+    """whether the peak power includes the release"""
     omega_gap: SpeedLimit
     """maximum speed while crossing the gap with the given drive train, scaled like all speeds"""
     mu_B: Coefficients
-    """pad friction coefficients; the worst case counts"""
+    """pad friction coefficients; the worst case determines the result"""
     believed: Literal["known", "as-given"]
     """whether the moment controller uses the true coefficients or the parameter set's"""
     response: Literal["enforced", "as-scaled"]
@@ -427,7 +428,7 @@ DEFAULTS = Options(
 
 _NONE_FEASIBLE = "no design is feasible. Increase t_90 or t_hold, or compare other designs"
 _NEAR = 1.05
-"""designs within this factor of the minimum power count as equally good"""
+"""designs within this factor of the minimum power are treated as equally good"""
 _ROUNDS = 2  # rounds that refine the optimum; each halves the spacing
 _TINY = 1e-6  # fraction of the spacing
 _BORDER = 0.02  # contour between 0, feasible, and 1, close to the last feasible designs
@@ -653,15 +654,15 @@ def _edges(best: _Best, options: Options) -> tuple[str, ...]:
 # --- Many drive trains as a dataset
 
 _LATE = 1.02
-"""ratio to the demanded time up to which a design counts as equally fast"""
+"""ratio to the demanded time up to which a design is treated as equally fast"""
 
 
 _HELD = 0.95
-"""fraction of the demand above which the demand counts as held"""
+"""fraction of the demand above which the demand is treated as held"""
 
 
 _LEFT = 0.05
-"""fraction of the demand below which the brake counts as released"""
+"""fraction of the demand below which the brake is treated as released"""
 
 
 _NEVER = 10.0  # lateness if the moment is never reached
@@ -751,7 +752,7 @@ def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Label
 
 # --- Limits of a drive train: active constraints, and failures or power of its neighbors
 
-_AT = 0.99  # fraction of a limit above which the limit counts as reached
+_AT = 0.99  # fraction of a limit above which the limit is treated as reached
 
 
 def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:

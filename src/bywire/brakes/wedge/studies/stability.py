@@ -223,7 +223,7 @@ class Options(ParameterSet):
     force: Force
     """normal force on the wedge without control"""
     moment: SomeMoment
-    """moment in the moment loop"""
+    """moment demand in the moment loop"""
     believed: Literal["known", "as-given"]
     """whether the moment controller uses the true mu_B or the parameter set's value"""
 

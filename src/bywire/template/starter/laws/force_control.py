@@ -28,7 +28,7 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Integral part of the speed control."""
 
-    v_i: Annotated[float, Signal("V", "integral part", 1.0)]
+    v_i: Annotated[float, Signal("V", "integral term", 1.0)]
 
 
 class Input(NamedTuple):

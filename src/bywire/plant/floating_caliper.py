@@ -7,21 +7,12 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
-from bywire.authoring import (
-    Array,
-    ContactCompliance,
-    Energy,
-    Length,
-    Overlap,
-    ParameterSet,
-    Role,
-    Signal,
-    Stiffness,
-    TimeConstant,
-    Unit,
-    validity,
-)
-from bywire.core import ops
+from bywire.core import ops, validity
+from bywire.core.faults import ParameterFault
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Length, Stiffness, TimeConstant, Unit
+from bywire.core.signals import ContactCompliance, Energy, Overlap, Role, Signal
+from bywire.core.typing import Array
 
 Quadratic = Annotated[float, Unit("N/m**2", 3e10), Field(ge=0, allow_inf_nan=False)]
 Cubic = Annotated[float, Unit("N/m**3", 7e12), Field(allow_inf_nan=False)]
@@ -61,6 +52,9 @@ class Parameters(ParameterSet):
                 f"{slope:.3g} N/m. Reduce n_max or increase k_3 = {self.k_3:g} N/m**3"
             )
         return self
+
+
+FAULTS = (ParameterFault("soft", "softer pads, or a cracked bridge", ("k_1", "k_2", "k_3"), 0.5),)
 
 
 class Input(NamedTuple):

@@ -1,0 +1,1 @@
+"""Elements that bywire does not include, one file each."""

@@ -1,0 +1,1 @@
+"""Figures that bywire does not include, one file each."""

@@ -1,0 +1,1 @@
+"""Control laws that bywire does not include, one file each."""

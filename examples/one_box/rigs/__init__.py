@@ -1,0 +1,1 @@
+"""The brake at a wheel, one rig per file."""

@@ -1,0 +1,1 @@
+"""Rigs, one file each."""
