@@ -285,3 +285,23 @@ def test_pressures_outside_their_range_are_reported():
     text = "the absolute pressure at the pump's suction is below zero at t = 1 s"
     assert return_pump.watch(t, u, par.pump, par.fluid) == [text]
     assert return_pump.watch(t, u._replace(p_s=rest), par.pump, par.fluid) == []
+
+
+def test_pistons_with_equal_phases_between_them_deliver_evenly():
+    """Full chambers: 2 and 3 pistons deliver A_p e omega times the known ripple."""
+    par = parameters({"fluid.beta": 1e15})
+    for count, least, most in ((2, 0.0, 1.0), (3, math.sqrt(0.75), 1.0)):
+        total = []
+        for theta in np.linspace(0.0, 2.0 * math.pi, 3601):
+            flow = 0.0
+            for k in range(count):
+                pump = par.pump.replace({"phase": 2.0 * math.pi * k / count})
+                u = return_pump.Input(theta, 100.0 * math.pi, 2 * BAR, 60 * BAR)
+                full = return_pump.area(pump) * pump.e * math.cos(theta + pump.phase)
+                flow += return_pump.output(return_pump.State(full), u, pump, par.fluid).q_d
+            total.append(flow)
+        stroke = return_pump.displacement(par.pump)
+        assert np.mean(total[:-1]) == pytest.approx(count * 50.0 * stroke, rel=1e-5)
+        largest = 0.5 * stroke * 100.0 * math.pi
+        assert min(total) == pytest.approx(least * largest, abs=1e-3 * largest)
+        assert max(total) == pytest.approx(most * largest, rel=1e-3)
