@@ -98,12 +98,20 @@ FIGURES: dict[str, Declared] = {
         "gas_volume", "p", (0.0, 20 * BAR), {"par.air": "entrained", "par.V_air": 1e-7}
     ),
     "caliper": Course("x.p", 0.05, {"u.q": 3e-6}),
+    "caliper_piston": Course("x.v", 0.002, {"u.q": 1e-5}, lines=("par.d", (1e3, 2e3, 4e3))),
     "check_valve": Curve("flow", "u.p_a", (-5 * BAR, 10 * BAR), _FLUID),
     "clearance_adjuster": Course("x.taken", 0.2, {"u.turning": 1.0, "par.law": "screw"}),
+    "compressor": Curve("output.mdot", "u.p", (1.0 * BAR, 12 * BAR), {"u.on": 1.0}),
     "corner_body": Course("x.v", 3.0, {"u.F": 3000.0, "x.v": 20.0}),
     "cup_seal": Curve("output.F_p", "u.v", (0.0, 0.1), {}, ("u.p", (0.0, 20 * BAR, 40 * BAR))),
     "current_drive": Course("x.demand", 0.01, {"u.i_ref": 10.0, "u.on": 1.0}),
     "current_sensor": Curve("reading", "i", (-60.0, 60.0)),
+    "dc_link": Course(
+        "x.v",
+        0.02,
+        {"u.i_dc": lambda t: 40.0 if t < 0.005 else -40.0, "x.v": 24.0},
+        lines=("par.chopper", ("off", "resistor")),
+    ),
     "dc_motor": Course("x.i", 0.01, {"u.v": 12.0}, lines=("u.omega", (0.0, 100.0, 200.0))),
     "disc_heat": Curve("friction", "T_disc", (293.0, 1000.0), {"par.law": "lumped"}),
     "drive_supply": Course("x.P", 0.5, {"u.motors": 200.0}),
@@ -127,6 +135,9 @@ FIGURES: dict[str, Declared] = {
         "x.Omega", 0.3, {"u.friction": -200.0, "x.Omega": 60.0, "par.law": "coasting"}
     ),
     "force_sensor": Curve("force", "u.X_1", (0.0, 50 * UM)),
+    "governor": Curve(
+        "output.on", "u.p", (6.0 * BAR, 10.0 * BAR), {"x.on": 1.0}, ("x.on", (0.0, 1.0))
+    ),
     "ground_support": Curve("forces.support", "u.z", (-0.01, 0.01)),
     "h_bridge": Curve("output.v", "u.duty", (-1.0, 1.0), {"u.v_bus": 12.0}),
     "inverter": Curve(
@@ -201,6 +212,7 @@ FIGURES: dict[str, Declared] = {
     "seal_friction": Curve(
         "output.T_p", "u.omega", (0.0, 20.0), {}, ("u.p", (0.0, 20 * BAR, 40 * BAR))
     ),
+    "seal_rollback": Course("output.F_seal", 3.5, {"u.v": _strokes}, "u.v"),
     "servo_motor": Course("x.omega", 0.1, {"u.v": 10.0}),
     "shaft": Course("x.omega", 5.0, {"u.torque": 1e-3}),
     "shaft_encoder": Curve(
@@ -215,6 +227,7 @@ FIGURES: dict[str, Declared] = {
         {"u.on": lambda t: 1.0 if 0.005 < t < 0.015 else 0.0, "x.x": 0.18 * MM, **_FLUID},
         lines=("u.p_a", (50 * BAR, 100 * BAR, 150 * BAR)),
     ),
+    "spring_brake": Curve("spring_force", "x.x", (0.0, 0.06)),
     "stiffening_caliper": Curve("volume", "x.p", (0.0, 100 * BAR)),
     "tandem_master_cylinder": Curve(
         "output.F_spring_1", "x.x_1", (10 * MM, 28 * MM), {}, ("x.x_2", (0.0, 5 * MM, 10 * MM))
@@ -262,6 +275,16 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "k_brk": 1.5,
         "v_S": 5e-3,
         "mu": 50.0,
+    },
+    "dc_link": {
+        "law": "diode",
+        "V_s": 24.0,
+        "R_s": 0.02,
+        "C": 5e-3,
+        "chopper": "off",
+        "V_on": 30.0,
+        "R_on": 0.05,
+        "V_most": 60.0,
     },
     "drum": {
         "law": "simplex",

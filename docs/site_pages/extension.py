@@ -34,6 +34,7 @@ _pictures: dict[str, list[str]] = {}  # marker in a page -> thumbnails that repl
 _MOVED = {
     "../examples/emb_caliper": "_generated/example-emb_caliper.md",
     "../examples/emb_caliper/README.md": "_generated/example-emb_caliper.md",
+    "../examples/one_box/README.md": "_generated/example-one_box.md",
     "../examples/truck_ebs/README.md": "_generated/example-truck_ebs.md",
     "../benches": "_generated/benches.md",
     "../src/bywire/plant": "_generated/elements/index.rst",

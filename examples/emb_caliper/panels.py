@@ -9,6 +9,7 @@ _FORCE = Panel(
     (Trace("F_cl"), Trace("F_meas", LineRole.SECOND), Trace("F_ref", LineRole.SET_POINT)),
     height=1.8,
 )
+_ESTIMATE = Panel("force error", (Trace("F_error"),))  # in estimated-force only
 _SPEED = Panel(
     "motor speed",
     (Trace("omega"), Trace("omega_ref", LineRole.SET_POINT)),
@@ -22,6 +23,7 @@ PANELS = Panels(
     ("emb-caliper",),
     (
         _FORCE,
+        _ESTIMATE,
         _SPEED,
         Panel(
             "current", (Trace("i"), Trace("i_ref", LineRole.SET_POINT)), saturation="sat_current"
@@ -35,6 +37,7 @@ PMSM_PANELS = Panels(
     ("emb-caliper-pmsm",),
     (
         _FORCE,
+        _ESTIMATE,
         _SPEED,
         Panel(
             "currents",

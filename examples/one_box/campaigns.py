@@ -9,7 +9,7 @@ APPLY = DeclaredCampaign(
     "every fault of the one-box brake while the pedal is pressed",
     {
         "bench": "pedal-apply",
-        "set": {"options.t_hold": "1.5 s", "options.t_end": "0.5 s"},
+        "set": {"options.t_hold": "2 s", "options.t_end": "1 ms"},
         "vary": {"others.c": "+-10 %", "caliper.c": "+-10 %", "motor.K_e": "+-5 %"},
         "campaign": {
             "onset": "0.5 s",

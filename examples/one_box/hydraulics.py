@@ -192,7 +192,8 @@ def _given(w: Any) -> float:
     cylinder = w.chamber.par
     turned = w.gear.x.theta - w.par.ecu.pressure.theta_rest
     displaced: float = cylinder.A_mc * w.gear.par.k_g * turned
-    return displaced + w.flow.V_given - w.flow.V_squeezed
+    outside: float = w.flow.V_given - w.flow.V_squeezed
+    return displaced + outside
 
 
 def _reading(law: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:

@@ -64,7 +64,7 @@ class AirBrake(Assembly[ParT, MemoryT]):
     E_walls = Integral(
         "J", "heat to the walls, work on ambient air", role=Role("sink", "walls", returns="any")
     )
-    m_fed = Integral("kg", "air taken from the reservoir")
+    m_fed = Integral("kg", "air from reservoir or compressor")
     m_out = Integral("kg", "exhausted and leaked air")
     relay = Part(relay_valve, state={"s": "spool"}, output=("feed", "exhaust"))
     feed = Part(air_orifice)
@@ -218,13 +218,13 @@ class BrakedWheel(Corner[ParT, MemoryT], AirBrake[ParT, MemoryT]):
 
     def power(self, w: Any) -> dict[str, float]:
         """Return the powers that do not follow from the parts."""
-        return {**super().power(w), "E_brake": -w.reaction[-1] * w.turning.x.omega}
+        return {**super().power(w), "E_brake": -w.reaction[1] * w.turning.x.omega}
 
     def record(self, w: Any) -> dict[str, float]:
         """Return the recorded signals other than states, wires and losses."""
         return {
             **super().record(w),
-            "torque": -w.reaction[-1],
+            "torque": -w.reaction[1],
             "E_wheel": road_wheel.energy(w.turning.x, w.turning.par),
         }
 

@@ -128,9 +128,8 @@ def test_fluid_below_vacuum_is_reported():
         values = recording[signal].values.copy()
         values[recording["time"].values > 0.5] = -1.2e5
         (text,) = model.watch(recording.assign({signal: ("time", values)}), par)
-        assert text.startswith(
-            f"the pressure in the {place} falls below vacuum, -1.01325 bar gauge, at t = 0.501 s"
-        )
+        below = f"the absolute pressure in the {place} is below zero at t = 0.501 s"
+        assert text.startswith(below)
 
 
 def test_small_pressures_below_zero_are_not():
@@ -149,4 +148,4 @@ def test_small_pressures_below_zero_are_not():
     )
     (recording,) = result.recordings.values()
     assert -1e5 < recording["p_mc"].values.min() < -1e4
-    assert not any("vacuum" in text for text in result.warnings)
+    assert not any("absolute" in text for text in result.warnings)

@@ -22,7 +22,7 @@ MOTOR = {
 }
 
 
-LAW = {"category": "B", "rate": 1e5, "t_off": 0.05}
+LAW = {"category": "B", "rate": 1e5, "T_least": 0.0, "t_off": 0.05}
 
 
 def stop(law, P_bat=25e3):

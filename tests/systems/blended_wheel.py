@@ -181,6 +181,7 @@ _NUMBERS = {
     "regeneration.blending.category": "B",
     "regeneration.blending.law": "reported",
     "regeneration.blending.rate": 1e5,
+    "regeneration.blending.T_least": 0.0,
     "regeneration.blending.t_off": 0.05,
     "regeneration.bus.T_d": 0.01,
     "regeneration.T_s": 1e-3,

@@ -248,19 +248,15 @@ CORNER = {
     "antilock.rules.tau_p": chosen(0.023, _SOUGHT),
     "antilock.rules.v_off": chosen(3.5, "the pulses of the encoder are rare below"),
     "antilock.rules.v_fall": chosen(6.0, "same as slip control"),
-    "antilock.valves.K_in": derived(
-        lambda par: orifice.coefficient(par.inlet.seat, par.fluid), _ASSUMED
-    ),
-    "antilock.valves.K_out": derived(
-        lambda par: orifice.coefficient(par.outlet.seat, par.fluid), _ASSUMED
-    ),
-    "antilock.valves.p_cr": chosen(0.1 * BAR, "small compared with a pulse"),
-    "antilock.valves.caliper.V_1": derived(lambda par: par.caliper.V_1, _ASSUMED),
-    "antilock.valves.caliper.p_1": derived(lambda par: par.caliper.p_1, _ASSUMED),
-    "antilock.valves.caliper.c": derived(lambda par: par.caliper.c, _ASSUMED),
-    "antilock.valves.p_low": chosen(2 * BAR, "accumulator with 0.5 cm^3"),
-    "antilock.valves.t_least": chosen(2e-3, "longer than the delay of the valves"),
-    "antilock.valves.q_pump": chosen(3.3 * CM3, "one piston at 3000 rpm"),
+    "valves.K_in": derived(lambda par: orifice.coefficient(par.inlet.seat, par.fluid), _ASSUMED),
+    "valves.K_out": derived(lambda par: orifice.coefficient(par.outlet.seat, par.fluid), _ASSUMED),
+    "valves.p_cr": chosen(0.1 * BAR, "small compared with a pulse"),
+    "valves.caliper.V_1": derived(lambda par: par.caliper.V_1, _ASSUMED),
+    "valves.caliper.p_1": derived(lambda par: par.caliper.p_1, _ASSUMED),
+    "valves.caliper.c": derived(lambda par: par.caliper.c, _ASSUMED),
+    "valves.p_low": chosen(2 * BAR, "accumulator with 0.5 cm^3"),
+    "valves.t_least": chosen(2e-3, "longer than the delay of the valves"),
+    "valves.q_pump": chosen(3.3 * CM3, "one piston at 3000 rpm"),
 }
 SETS = (
     CitedSet(

@@ -13,6 +13,7 @@ from bywire.core.quantities import Duration, Unit
 from bywire.core.signals import Signal
 
 TorqueRate = Annotated[float, Unit("N*m/s", 5e3), Field(gt=0, allow_inf_nan=False)]
+LeastTorque = Annotated[float, Unit("N*m", 20.0), Field(ge=0, allow_inf_nan=False)]
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-2), Gt(0)]
 Torque = Annotated[float, Signal("N*m", "braking torque", 300.0)]
 Demand = Annotated[float, Signal("N*m", "demanded braking torque", 300.0), Ge(0)]
@@ -38,6 +39,8 @@ class Parameters(ParameterSet):
     """motor torque that the friction brake complements"""
     rate: TorqueRate
     """largest rate of the motor's command"""
+    T_least: LeastTorque
+    """friction demand that remains while the pedal brakes, to keep the pads on the disc"""
     t_off: Duration
     """time in which the motor's command falls to zero while slip control acts"""
 
@@ -69,11 +72,14 @@ class Output(NamedTuple):
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
     r"""Advance the law by one sample.
 
-    .. math:: T_m = \min(T_{set}, T_{limit}), \quad T_f = \max(T_{set} - T_{seen}, 0)
+    .. math::
+        T_m = \min(T_{set} - T_{least}, T_{limit}), \quad
+        T_f = \max(T_{set} - T_{seen}, T_{least})
 
-    In category B, the set point :math:`T_{set}` is the sum of both demands. In category A, it is
-    the demand of the released accelerator, and :math:`T_f` is the pedal's demand. Corners: the
-    motor's limit, the largest rate, no friction demand, and the switch of slip control.
+    In category B, the set point :math:`T_{set}` is the sum of both demands. In category A, the
+    motor follows the demand of the released accelerator, and :math:`T_f` is the pedal's demand.
+    Corners: the motor's limit, the largest rate, the least friction demand, and the switch of slip
+    control.
 
     Notes
     -----
@@ -88,7 +94,8 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     D. Kade et al., US patent 5,511,859, 1996: friction demand from the reported motor torque.
     UN Regulation No. 13-H, section 2: electric regenerative braking systems of categories A and B.
     """
-    wanted = u.T_coast if par.category == "A" else u.T_demand + u.T_coast
+    least = ops.fmin(par.T_least, u.T_demand)
+    wanted = u.T_coast if par.category == "A" else u.T_demand + u.T_coast - least
     free = ops.clip(ops.fmin(wanted, u.limit), x.T_m - T * par.rate, x.T_m + T * par.rate)
     # Slip control takes the motor out, because it is slower to modulate than the friction brake.
     out = ops.fmax(x.T_m - T / par.t_off * ops.fmax(u.limit, x.T_m), 0.0)
@@ -99,5 +106,5 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
         seen = command
     else:
         seen = ops.where(u.slip > 0.5, command, ops.fmin(wanted, u.limit_ahead))
-    friction = u.T_demand if par.category == "A" else ops.fmax(wanted - seen, 0.0)
+    friction = u.T_demand if par.category == "A" else ops.fmax(wanted + least - seen, least)
     return State(T_m=command), Output(T_motor=command, T_friction=friction)

@@ -104,9 +104,9 @@ class Parameters(ParameterSet):
     k: Corner
     """rate of each of the two poles of the torque filter"""
     play: AnglePlay
-    """motion that counts as a motion in one direction, above the sensor's resolution"""
+    """motion that is treated as a motion in one direction, above the sensor's resolution"""
     t_rest: Duration
-    """time without such a motion after which the shaft counts as being at rest"""
+    """time without such a motion after which the shaft is considered to be at rest"""
     omega_min: Speed
     """speed below which breakaway friction makes the balance uncertain"""
     spread_s: Spread

@@ -53,7 +53,7 @@ DOUBT = 0.3
 SMALLEST = 1e-6
 """smallest divisor, relative to the usual magnitude"""
 WIDEST = 2.0
-"""the fit stays within this factor of the scale, and within 1 plus it of the friction"""
+"""the fitted scale stays within this factor of its start, and each friction below 1 plus it"""
 
 
 class Parameters(ParameterSet):
@@ -238,9 +238,9 @@ def _touched(x: State, u: Input, of: estimator.Parameters, par: Parameters) -> S
     Right after contact, the filtered load torque is that of an angle 2/k ago, so that
 
     .. math:: \theta_0 = \theta - \frac{2 \omega}{k}
-        - \frac{L[T_L] - C}{(\gamma + \mathrm{sgn}(\omega)\, G) s \gamma k_1}
+        - \frac{L[T_L] - C}{(\gamma + G) s \gamma k_1}
     """
-    per_force = of.gamma + u.way * x.fit_G
+    per_force = of.gamma + x.fit_G
     slope = per_force * x.fit_s * of.gamma * of.k_1
     doubt = CONTACT * CONTACT * _noise(u, of, par)
     fresh = ops.where(-x.h_t_2 < 0.5 * slope, u.valid, 0.0)
@@ -258,8 +258,8 @@ def _touched(x: State, u: Input, of: estimator.Parameters, par: Parameters) -> S
         h_t_2=ops.where(touches, -slope, x.h_t_2),
         h_s_1=ops.where(touches, e / x.fit_s, x.h_s_1),
         h_s_2=ops.where(touches, e / x.fit_s, x.h_s_2),
-        h_G_1=ops.where(touches, u.way * force, x.h_G_1),
-        h_G_2=ops.where(touches, u.way * force, x.h_G_2),
+        h_G_1=ops.where(touches, force, x.h_G_1),
+        h_G_2=ops.where(touches, force, x.h_G_2),
         P_tt=ops.where(touches, spread * spread, x.P_tt),
         P_ts=ops.where(touches, 0.0, x.P_ts),
         P_tC=ops.where(touches, 0.0, x.P_tC),
@@ -270,7 +270,10 @@ def _touched(x: State, u: Input, of: estimator.Parameters, par: Parameters) -> S
 def _corrected(
     x: State, u: Input, T: SampleTime, of: estimator.Parameters, par: Parameters
 ) -> State:
-    """Return the state with a fit that takes the sample into account."""
+    """Return the state with a fit that takes the sample into account.
+
+    Right after contact, the sensitivity to the contact angle lags, so the fit waits.
+    """
     e = u.T_L - _expected(x)
     # Sensitivities relative to the uncertainties.
     w_t, w_C, w_G = _uncertainties(of, par)

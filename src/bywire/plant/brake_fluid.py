@@ -21,7 +21,6 @@ from bywire.core.signals import (
     Signal,
 )
 from bywire.core.typing import Array
-from bywire.core.units import shown
 from bywire.core.validity import first, row_by_row
 
 GaugePressure = Annotated[float, Signal("Pa", "pressure", 2e6), Ge(0)]
@@ -67,8 +66,8 @@ FAULTS = (
 
 @row_by_row
 def watch(t: Array, p: GaugePressure, par: Parameters, place: str) -> list[str]:
-    """Warn if the pressure at a place falls below vacuum."""
-    text = f"the pressure in the {place} falls below vacuum, {shown(-par.p_atm, 'Pa')} gauge,"
+    """Warn if the absolute pressure at a place, such as "in the caliper", is below zero."""
+    text = f"the absolute pressure {place} is below zero"
     return first(t, p < -par.p_atm, text, ". Real fluid would evaporate, which is not modeled")
 
 

@@ -128,5 +128,5 @@ def power_loss(u: Input, par: Parameters) -> Loss:
 
 @row_by_row
 def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
-    """Warn if the pressure falls below vacuum."""
-    return brake_fluid.watch(t, x.p, fluid, "master cylinder")
+    """Warn if the absolute pressure is below zero."""
+    return brake_fluid.watch(t, x.p, fluid, "in the master cylinder")

@@ -90,5 +90,5 @@ def power_in(x: State, u: Input, fluid: brake_fluid.Parameters) -> Power:
 
 @row_by_row
 def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
-    """Warn if the pressure falls below vacuum."""
-    return brake_fluid.watch(t, x.p, fluid, "caliper")
+    """Warn if the absolute pressure is below zero."""
+    return brake_fluid.watch(t, x.p, fluid, "in the caliper")

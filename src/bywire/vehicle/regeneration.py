@@ -88,8 +88,10 @@ Memory: Any = joined(__name__, "Memory", Law, _SENT, _REPORT)
 
 
 CHANNELS = (
-    Channel("motor", "command of the motor", "N*m", "T_m_ref", "drive", task="blending"),
-    Channel("motor_torque", "motor torque that the motor reports", "N*m", "T_m", offset=10.0),
+    Channel(
+        "wheel_motor", "command of the wheel motor", "N*m", "T_m_ref", "drive", task="blending"
+    ),
+    Channel("motor_report", "torque that the wheel motor reports", "N*m", "T_m", offset=10.0),
     Channel("brake_demand", "demand on the friction brake", "N*m", "T_brake", "drive"),
 )
 """signals that faults can corrupt, for the `Channels` of a vehicle with regeneration"""
@@ -175,8 +177,11 @@ class Regenerating(Assembly[ParT, MemoryT]):
         """Return whether slip control acts, above 0.5; by default, there is no slip control."""
         return 0.0
 
-    def demands(self, u: Any, par: ParT) -> tuple[float, float]:
-        """Return the torques that pedal and released accelerator demand [N m]."""
+    def demands(self, m: Any, u: Any, par: ParT) -> tuple[float, float]:
+        """Return the torques that pedal and released accelerator demand [N m].
+
+        If there is slip control, the first one is the pedal's demand after slip control.
+        """
         return u.T_demand, u.T_coast
 
     def motor_wheel(self, x: Any, par: ParT) -> tuple[float, float]:
@@ -206,7 +211,7 @@ class Regenerating(Assembly[ParT, MemoryT]):
 
     def _blended(self, x: Any, m: Any, u: Any, par: Any) -> Any:
         omega, r = self.motor_wheel(x, par)
-        seen = Readings(*self.demands(u, par), x.T_m, omega, r, x.soc, self.slip_acts(m))
+        seen = Readings(*self.demands(m, u, par), x.T_m, omega, r, x.soc, self.slip_acts(m))
         return tick(seen, m, par.regeneration)
 
 

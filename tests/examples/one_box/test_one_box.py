@@ -109,7 +109,7 @@ def test_volume_is_conserved_with_linear_brakes():
         (
             "caliper.V_1",
             "others.V_1",
-            "antilock.valves.caliper.V_1",
+            "valves.caliper.V_1",
             "ecu.pressure.brakes.V_1",
         ),
         "0 ml",
