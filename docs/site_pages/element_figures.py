@@ -264,10 +264,10 @@ def _saturated_map() -> dict[str, Any]:
 
 
 VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set contains or uses
-    "abs_modulator": {"tau_hold": 0.008, "tau_vent": 0.008},
     "adhesion": {"curve": "burckhardt"},
     "backlash": {"i": 1.0, "b": 10e-3, "k": 300.0, "tau": 1e-4},
     "ball_ramp": {"r": 20 * MM, "alpha": 3 * DEG, "mu": 0.0},
+    "caliper_piston": {"A_pd": 1.96e-3, "V_0": 1e-5, "m": 0.3, "d": 1e3, "G_leak": 0.0},
     "cup_seal": {
         "F_pr": 10.0,
         "f_p": 1e-5,
@@ -331,6 +331,7 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "G": 60 * BAR,
     },
     "rack": {"r_p": 15 * MM, "eta": 0.9},
+    "seal_rollback": {"k": 6e5, "z_max": 0.3 * MM},
     "solenoid_armature": {
         **_SEAT,
         "unpowered": "closed",
@@ -354,27 +355,6 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "k_s1": 4e3,
         "F_s2": 60.0,
         "k_s2": 4e3,
-    },
-    "traction_battery": {
-        "law": "cells",
-        "P_max": 25e3,
-        "Q": 1.35e5,
-        "V_0": 320.0,
-        "V_1": 410.0,
-        "V_max": 410.0,
-        "R": 0.4,
-        "I_max": 75.0,
-        "T": 298.15,
-        "T_cold": 263.15,
-        "T_warm": 283.15,
-    },
-    "wheel_motor": {
-        "T_max": 500.0,
-        "P_max": 25e3,
-        "eta": 0.9,
-        "v_1": 15.0 / 3.6,
-        "v_2": 5.0 / 3.6,
-        "tau": 0.01,
     },
 }
 

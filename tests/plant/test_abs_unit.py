@@ -103,7 +103,7 @@ class Unit(Assembly[Parameters, Stimulus]):
         fluid, convected = w.par.fluid, brake_fluid.convected_power
         y = return_pump.output(w.pump.x, w.pump.u, w.pump.par, fluid)
         return {
-            "E_shaft": y.torque * w.shaft.x.omega,
+            "E_shaft": return_pump.shaft_power(w.pump.x, w.pump.u, w.pump.par, fluid),
             "E_sucked": convected(y.q_s, w.p_store, fluid),
             "V_given": _given(w),
             "V_sucked": y.q_s,
@@ -235,7 +235,7 @@ def reference() -> Any:
         phi = SPEED * t + math.pi / 2
         growth = -A_p * 1e-3 * SPEED * math.sin(phi)
         empty = max(A_p * 1e-3 * math.cos(phi) - fluid, 0.0)
-        width = 5e-3 * 2.0 * A_p * 1e-3
+        width = 2e-2 * 2.0 * A_p * 1e-3
         void = empty - 0.5 * width if empty > width else 0.5 * empty * empty / width
         through = growth + void / 5e-5
         most = turbulent(max(p_store + p_atm - 0.2 * BAR, 0.0), 2.5e-3)
