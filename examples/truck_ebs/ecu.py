@@ -23,7 +23,7 @@ class Memory(NamedTuple):
     ]
     p_meas: Annotated[float, Signal("Pa", "measured pressure", 4e5)]
     p_control: Annotated[float, Signal("Pa", "control pressure", 4e5), Limited("ecu.p_max")]
-    integral: Annotated[float, Signal("Pa", "integral part of the pressure control", 1e4)]
+    integral: Annotated[float, Signal("Pa", "integral term of the pressure control", 1e4)]
 
 
 def tick(x: Any, m: Any, u: Stimulus, par: Any) -> Any:

@@ -66,7 +66,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Integral parts, and the field-weakening current."""
+    """Integral terms, and the field-weakening current."""
 
     z_d: Annotated[float, Signal("V", "integral term, along the magnets", 1.0)]
     z_q: Annotated[float, Signal("V", "integral term, across the magnets", 1.0)]

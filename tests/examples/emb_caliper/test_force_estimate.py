@@ -169,6 +169,17 @@ def test_an_application_finds_the_contact(
     assert figures["contact_angle"] == pytest.approx(par.ecu.estimator.theta_0, abs=bound)
 
 
+def test_a_threshold_finds_the_contact_late(caliper: Path) -> None:
+    """The order of its error; the estimate uses a threshold only to begin its fit."""
+    par = toolkit.parameters(SETS[0])
+    run = toolkit.run(toolkit.Bench("estimated-force", SETS[0], options=UNTRAINED)).recording
+    t, torque = run["time"].values, run["T_load"].values
+    k = int(np.argmax((torque > 0.06) & (t > 0.1)))
+    late = float(run["theta"][k]) - par.ecu.estimator.theta_0
+    assert 2.5 < late < 10.0
+    assert 600.0 < float(run["F_cl"][k]) < 2400.0
+
+
 def test_a_wrong_torque_constant_becomes_a_wrong_scale(row: Row, caliper: Path) -> None:
     """The closed form in steady motion: all torques scale with the torque constant."""
     par = toolkit.parameters(SETS[0])
