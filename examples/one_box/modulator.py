@@ -36,7 +36,7 @@ MemoryT = TypeVar("MemoryT")
 
 
 class Modulator(Hydraulics[ParT, MemoryT]):
-    """The brake whose wheel pressure can be lowered. The pump returns the fluid to the circuit."""
+    """The brake whose wheel pressure can be lowered. The pump returns the fluid to the circuit.
 
     The set-valued load of the pump is a second dry friction.
     """
