@@ -173,7 +173,7 @@ _LAYOUT = "rear drum of a compact car"
 _ROAD = "dry asphalt, Burckhardt"
 _STRETCH = {"c1": 1.2801, "c2": 23.99, "c3": 0.52, "B": 10.0, "C": 1.9, "D": 1.0, "E": 0.97}
 _NUMBERS = {
-    "circuit.f_n": chosen(8.0, "a brake by wire of usual speed"),
+    "circuit.f_n": chosen(8.0, "typical speed of a by-wire brake"),
     "circuit.zeta": chosen(0.9, "little overshoot"),
     "drum.law": chosen("simplex", _LAYOUT),
     "drum.r": chosen(0.1015, _LAYOUT),

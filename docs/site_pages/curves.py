@@ -175,7 +175,7 @@ def parameters(
     values: tuple[tuple[str, Any], ...],
 ) -> ParameterSet:
     """Return parameters of a class: from values by name or the first set, with changes."""
-    base = kind.create(dict(values)) if values else _examples()[kind][0]
+    base = kind.create(dict(values)) if values else examples()[kind][0]
     return base.replace(dict(changes)) if changes else base
 
 
@@ -183,10 +183,10 @@ Groups = dict[type[ParameterSet], tuple[ParameterSet, str]]
 
 
 @cache
-def _examples() -> Groups:
+def examples() -> Groups:
     """Return the first parameters of each class, and the set of bywire or an example with them."""
     groups: Groups = {}
-    for cited in (*PARAMETER_SETS.all().values(), *_sets_of_examples()):
+    for cited in (*PARAMETER_SETS.all().values(), *_sets_ofexamples()):
         _gather(cited.parameters(), cited.name, groups)
     return groups
 
@@ -198,7 +198,7 @@ def _gather(par: ParameterSet, name: str, groups: Groups) -> None:
             _gather(value, name, groups)
 
 
-def _sets_of_examples() -> Iterator[CitedSet]:
+def _sets_ofexamples() -> Iterator[CitedSet]:
     """Yield the parameter sets of the examples, without loading their brakes."""
     sys.path.insert(0, str(EXAMPLES))
     try:
@@ -325,9 +325,9 @@ def caption(element: ModuleType, declared: Declared, values: Values) -> str:
             fixed.append(f"``{name}`` = {amount(value, unit, 3)}")
     given = f", with {', '.join(fixed)}" if fixed else ""
     kind = getattr(element, "Parameters", None)
-    source = " Parameters: chosen for this figure." if values or kind not in _examples() else ""
+    source = " Parameters: chosen for this figure." if values or kind not in examples() else ""
     if kind is not None and not source:
-        source = f" Parameters: ``{_examples()[kind][1]}``."
+        source = f" Parameters: ``{examples()[kind][1]}``."
     return f"``{declared.of}`` versus ``{over}``{given}.{source}"
 
 

@@ -15,6 +15,7 @@ PLACE = "figures"
 """folder of the figures, beside the pages of the elements"""
 
 BAR, MM, UM, DEG = 1e5, 1e-3, 1e-6, math.pi / 180.0
+SHAFT = 100.0 * math.pi  # speed of a pump [rad/s], 3000 rpm
 
 
 def _strokes(t: float) -> float:
@@ -42,11 +43,12 @@ _INTERIOR = {
     "par.psi": 0.066,
     "par.iron": "off",
 }
+_SEAT = {"seat.d": 0.6 * MM, "seat.C_d": 0.65, "seat.Re_cr": 100.0}
 _FLUID = {f"fluid.{name}": value for name, value in {"nu": 12e-6, "rho": 1070.0}.items()}
 
 FIGURES: dict[str, Declared] = {
     "abs_modulator": Course("x.hold", 0.1, {"u.close": lambda t: 1.0 if t < 0.05 else 0.0}),
-    "accumulator": Curve("pressure", "x.V", (0.0, 4e-6)),
+    "accumulator": Curve("pressure", "x.V", (-20e-9, 3.502e-6)),
     "adc": Curve("rounded", "reading", (0.0, 0.01), {"par.law": "quantized"}),
     "adhesion": Curve(
         "adhesion",
@@ -96,12 +98,20 @@ FIGURES: dict[str, Declared] = {
         "gas_volume", "p", (0.0, 20 * BAR), {"par.air": "entrained", "par.V_air": 1e-7}
     ),
     "caliper": Course("x.p", 0.05, {"u.q": 3e-6}),
+    "caliper_piston": Course("x.v", 0.002, {"u.q": 1e-5}, lines=("par.d", (1e3, 2e3, 4e3))),
     "check_valve": Curve("flow", "u.p_a", (-5 * BAR, 10 * BAR), _FLUID),
     "clearance_adjuster": Course("x.taken", 0.2, {"u.turning": 1.0, "par.law": "screw"}),
+    "compressor": Curve("output.mdot", "u.p", (1.0 * BAR, 12 * BAR), {"u.on": 1.0}),
     "corner_body": Course("x.v", 3.0, {"u.F": 3000.0, "x.v": 20.0}),
     "cup_seal": Curve("output.F_p", "u.v", (0.0, 0.1), {}, ("u.p", (0.0, 20 * BAR, 40 * BAR))),
     "current_drive": Course("x.demand", 0.01, {"u.i_ref": 10.0, "u.on": 1.0}),
     "current_sensor": Curve("reading", "i", (-60.0, 60.0)),
+    "dc_link": Course(
+        "x.v",
+        0.02,
+        {"u.i_dc": lambda t: 40.0 if t < 0.005 else -40.0, "x.v": 24.0},
+        lines=("par.chopper", ("off", "resistor")),
+    ),
     "dc_motor": Course("x.i", 0.01, {"u.v": 12.0}, lines=("u.omega", (0.0, 100.0, 200.0))),
     "disc_heat": Curve("friction", "T_disc", (293.0, 1000.0), {"par.law": "lumped"}),
     "drive_supply": Course("x.P", 0.5, {"u.motors": 200.0}),
@@ -116,11 +126,18 @@ FIGURES: dict[str, Declared] = {
     "end_stop": Curve(
         "forces.far", "u.x", (0.0, 12 * MM), {"u.x_end": 10 * MM, "u.x_rest": -10 * MM}
     ),
+    "floating_caliper": Curve(
+        "forces.F_cl", "u.x", (0.0, 1.5 * MM), {}, ("par.clearance", (0.2 * MM, 0.4 * MM, 0.6 * MM))
+    ),
     "fluid_vapor": Curve("volume", "T", (400.0, 480.0), {}, ("par.water", (0.0, 0.02, 0.037))),
+    "flux_map": Curve("flux.psi_q", "i.i_q", (-20.0, 20.0), {}, ("i.i_d", (-15.0, 0.0, 15.0))),
     "flywheel": Course(
         "x.Omega", 0.3, {"u.friction": -200.0, "x.Omega": 60.0, "par.law": "coasting"}
     ),
     "force_sensor": Curve("force", "u.X_1", (0.0, 50 * UM)),
+    "governor": Curve(
+        "output.on", "u.p", (6.0 * BAR, 10.0 * BAR), {"x.on": 1.0}, ("x.on", (0.0, 1.0))
+    ),
     "ground_support": Curve("forces.support", "u.z", (-0.01, 0.01)),
     "h_bridge": Curve("output.v", "u.duty", (-1.0, 1.0), {"u.v_bus": 12.0}),
     "inverter": Curve(
@@ -132,6 +149,9 @@ FIGURES: dict[str, Declared] = {
     ),
     "lead_screw": Curve(
         "efficiencies.eta_b", "par.mu", (0.02, 0.3), {}, ("par.lead", (2 * MM, 4 * MM, 6 * MM))
+    ),
+    "lever": Curve(
+        "slope", "x", (0.0, 40 * MM), {"par.law": "turning"}, ("par.phi_0", (0.0, 0.25, 0.5))
     ),
     "master_cylinder": Course("x.p", 0.02, {"u.v": 0.01}),
     "moment_sensor": Course("x.M", 0.05, {"u.M": 300.0}),
@@ -166,9 +186,24 @@ FIGURES: dict[str, Declared] = {
         "x.p", 0.3, {"u.p_ref": 40 * BAR}, lines=("par.f_n", (5.0, 10.0, 20.0))
     ),
     "pressure_sensor": Curve("reading", "p", (-10 * BAR, 100 * BAR)),
+    "proportional_valve": Curve(
+        "held_pressure", "i", (1.0, 2.5), {}, ("par.seat.d", (0.5 * MM, 0.6 * MM, 0.8 * MM))
+    ),
     "rack": Curve("output.load", "u.force", (-1000.0, 1000.0)),
     "relay_valve": Curve("output.feed", "x.s", (-1.0, 1.0)),
     "reservoir_port": Curve("output.G", "u.x", (0.0, 2 * MM), {"par.law": "dead-stroke"}),
+    "return_pump": Course(
+        "output.q_d",
+        0.03,
+        {
+            "u.theta": lambda t: SHAFT * t,
+            "u.omega": SHAFT,
+            "u.p_d": 100 * BAR,
+            "u.p_s": 2 * BAR,
+            "x.V": 33e-9,
+        },
+        lines=("par.suction.seat.d", (2.5 * MM, 1.0 * MM, 0.6 * MM)),
+    ),
     "road": Curve(
         "share", "x", (0.0, 60.0), {"par.x_change": 20.0, "par.x_back": 45.0, "par.ramp": 2.0}
     ),
@@ -177,12 +212,26 @@ FIGURES: dict[str, Declared] = {
     "seal_friction": Curve(
         "output.T_p", "u.omega", (0.0, 20.0), {}, ("u.p", (0.0, 20 * BAR, 40 * BAR))
     ),
+    "seal_rollback": Course("output.F_seal", 3.5, {"u.v": _strokes}, "u.v"),
     "servo_motor": Course("x.omega", 0.1, {"u.v": 10.0}),
-    "shaft": Course("x.omega", 1.0, {"u.torque": 0.1}),
+    "shaft": Course("x.omega", 5.0, {"u.torque": 1e-3}),
     "shaft_encoder": Curve(
         "reading", "theta", (0.0, 0.05), {"par.law": "quantized", "par.counts": 800.0}
     ),
+    "solenoid_armature": Curve(
+        "magnetic_force", "x.x", (0.0, 0.25 * MM), {}, ("i", (1.0, 2.0, 3.0))
+    ),
+    "solenoid_valve": Course(
+        "flow",
+        0.03,
+        {"u.on": lambda t: 1.0 if 0.005 < t < 0.015 else 0.0, "x.x": 0.18 * MM, **_FLUID},
+        lines=("u.p_a", (50 * BAR, 100 * BAR, 150 * BAR)),
+    ),
+    "spring_brake": Curve("spring_force", "x.x", (0.0, 0.06)),
     "stiffening_caliper": Curve("volume", "x.p", (0.0, 100 * BAR)),
+    "tandem_master_cylinder": Curve(
+        "output.F_spring_1", "x.x_1", (10 * MM, 28 * MM), {}, ("x.x_2", (0.0, 5 * MM, 10 * MM))
+    ),
     "traction_battery": Curve(
         "charging_limit", "x.soc", (0.0, 1.0), {}, ("par.T", (263.15, 273.15, 298.15))
     ),
@@ -202,18 +251,23 @@ FIGURES: dict[str, Declared] = {
 }
 
 
-VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set contains
-    "abs_modulator": {"tau_hold": 0.008, "tau_vent": 0.008},
-    "accumulator": {"p_0": 1.5 * BAR, "k": BAR / 1e-6, "V_max": 3.5e-6},
+def _saturated_map() -> dict[str, Any]:
+    """Return the flux map of a motor that saturates in both axes, from one potential."""
+    L, nodes = 0.2e-3, [20.0 * (k / 4 - 1) for k in range(9)]
+    pairs = [(d / 20.0, q / 20.0) for d in nodes for q in nodes]
+    return {
+        "i_d": tuple(nodes),
+        "i_q": tuple(nodes),
+        "psi_d": tuple(20.0 * L * (d - 0.1 * d**3 - 0.1 * q * q) for d, q in pairs),
+        "psi_q": tuple(20.0 * L * (1.5 * q - 0.2 * q * d - 0.25 * q**3) for d, q in pairs),
+    }
+
+
+VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set contains or uses
     "adhesion": {"curve": "burckhardt"},
     "backlash": {"i": 1.0, "b": 10e-3, "k": 300.0, "tau": 1e-4},
     "ball_ramp": {"r": 20 * MM, "alpha": 3 * DEG, "mu": 0.0},
-    "check_valve": {
-        "seat.d": 1.2 * MM,
-        "seat.C_d": 0.65,
-        "seat.Re_cr": 100.0,
-        "p_crack": 1.0 * BAR,
-    },
+    "caliper_piston": {"A_pd": 1.96e-3, "V_0": 1e-5, "m": 0.3, "d": 1e3, "G_leak": 0.0},
     "cup_seal": {
         "F_pr": 10.0,
         "f_p": 1e-5,
@@ -221,6 +275,16 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "k_brk": 1.5,
         "v_S": 5e-3,
         "mu": 50.0,
+    },
+    "dc_link": {
+        "law": "diode",
+        "V_s": 24.0,
+        "R_s": 0.02,
+        "C": 5e-3,
+        "chopper": "off",
+        "V_on": 30.0,
+        "R_on": 0.05,
+        "V_most": 60.0,
     },
     "drum": {
         "law": "simplex",
@@ -232,8 +296,8 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "theta_2": 2.3,
         "mu": 0.35,
     },
+    "flux_map": _saturated_map(),
     "lead_screw": {"lead": 4 * MM, "d_m": 20 * MM, "mu": 0.12, "beta": 15 * DEG},
-    "orifice": {"d": 0.5 * MM, "C_d": 0.65, "Re_cr": 100.0},
     "pad_hysteresis": {
         "law": "constant",
         "k_1": 1e7,
@@ -254,31 +318,43 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "A_pad": 50e-4,
         "E_pad": 5e8,
     },
-    "pedal_simulator": {"k_1": 12e3, "k_2": 40e3, "x_1": 8 * MM, "d_in": 200.0, "d_out": 400.0},
     "planetary_gear": {"z_sun": 18.0, "z_ring": 72.0, "eta": 0.95},
-    "rack": {"r_p": 15 * MM, "eta": 0.9},
-    "shaft": {"J": 1e-3, "d": 2e-3},
-    "stiffening_caliper": {"V_1": 0.35e-6, "p_1": 4 * BAR, "c": 0.011e-6 / BAR},
-    "traction_battery": {
-        "law": "cells",
-        "P_max": 25e3,
-        "Q": 1.35e5,
-        "V_0": 320.0,
-        "V_1": 410.0,
-        "V_max": 410.0,
-        "R": 0.4,
-        "I_max": 75.0,
-        "T": 298.15,
-        "T_cold": 263.15,
-        "T_warm": 283.15,
+    "proportional_valve": {
+        **_SEAT,
+        "alpha": 0.8,
+        "lift": 0.2 * MM,
+        "m": 5e-3,
+        "k_s": 2e3,
+        "F_s0": 1.0,
+        "d": 2.0,
+        "F_h": 0.02,
+        "G": 60 * BAR,
     },
-    "wheel_motor": {
-        "T_max": 500.0,
-        "P_max": 25e3,
-        "eta": 0.9,
-        "v_1": 15.0 / 3.6,
-        "v_2": 5.0 / 3.6,
-        "tau": 0.01,
+    "rack": {"r_p": 15 * MM, "eta": 0.9},
+    "seal_rollback": {"k": 6e5, "z_max": 0.06 * MM},
+    "solenoid_armature": {
+        **_SEAT,
+        "unpowered": "closed",
+        "alpha": 0.8,
+        "travel": 0.25 * MM,
+        "g_0": 0.4 * MM,
+        "k_m": 1.2e-7,
+        "L_0": 1e-3,
+        "R": 4.5,
+        "m": 3e-3,
+        "d": 1.0,
+        "k": 2e3,
+        "F_s0": 4.0,
+        "F_h": 0.2,
+        "dirt": 0.0,
+    },
+    "tandem_master_cylinder": {
+        "m_1": 0.2,
+        "m_2": 0.1,
+        "F_s1": 80.0,
+        "k_s1": 4e3,
+        "F_s2": 60.0,
+        "k_s2": 4e3,
     },
 }
 

@@ -18,6 +18,7 @@ import hashlib
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -27,6 +28,8 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
+
+from site_pages import fork_server
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -155,28 +158,50 @@ def _pictures(folder: Path) -> dict[Path, int]:
     return {file: file.stat().st_mtime_ns for file in sorted(folder.rglob("*.png"))}
 
 
-def _run(language: str, command: str, folder: Path) -> str:
-    """Run a command and return what it prints."""
+def _needs_shell(command: str) -> bool:
+    """Return whether a command has a variable or an operator, such as a pipe."""
+    words = shlex.shlex(command, posix=True, punctuation_chars=True)
+    words.whitespace_split = True
+    return "$" in command or any(set(word) <= set("|&;<>()") for word in words if word)
+
+
+def _output(language: str, command: str, folder: Path) -> tuple[int, str]:
+    """Return exit status and output of a command."""
+    settings = {
+        "COLUMNS": str(COLUMNS),
+        "NO_COLOR": "1",
+        "PYTHONUNBUFFERED": "1",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "MPLBACKEND": "agg",
+    }
     words: str | list[str] = command
     if language == "python":
         words = [sys.executable, "-c", command]
     elif command.startswith("bywire "):
+        if fork_server.can_fork() and not _needs_shell(command):
+            arguments = shlex.split(command, comments=True)[1:]
+            return fork_server.run(arguments, folder, settings)
         words = f'"{sys.executable}" -c "{_START}" {command.removeprefix("bywire ")}'
-    settings = {"COLUMNS": str(COLUMNS), "NO_COLOR": "1", "PYTHONUNBUFFERED": "1"}
     done = subprocess.run(
         words,
         shell=isinstance(words, str),
         cwd=folder,
-        env={**os.environ, **settings, "PYTHONDONTWRITEBYTECODE": "1", "MPLBACKEND": "agg"},
+        env={**os.environ, **settings},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         encoding="utf-8",
         check=False,
     )
-    text = done.stdout.replace(f"{folder}{os.sep}", "")
+    return done.returncode, done.stdout
+
+
+def _run(language: str, command: str, folder: Path) -> str:
+    """Run a command and return what it prints."""
+    status, text = _output(language, command, folder)
+    text = text.replace(f"{folder}{os.sep}", "")
     text = "\n".join(map(_wrapped, text.splitlines())).rstrip()
-    if done.returncode != (1 if _STATUS in command else 0):
-        raise PageError(f"exit status {done.returncode}: {command}\n{text[-2000:]}")
+    if status != (1 if _STATUS in command else 0):
+        raise PageError(f"exit status {status}: {command}\n{text[-2000:]}")
     return text
 
 

@@ -70,6 +70,7 @@ class EmbCaliper(CaliperBrake[Par, Any]):
         "F_hat",
         "F_curve",
         "F_balance",
+        "T_load",
         "balance_valid",
         "on_estimate",
         "theta_0_hat",

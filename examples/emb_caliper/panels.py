@@ -9,6 +9,7 @@ _FORCE = Panel(
     (Trace("F_cl"), Trace("F_meas", LineRole.SECOND), Trace("F_ref", LineRole.SET_POINT)),
     height=1.8,
 )
+_ESTIMATE = Panel("force error", (Trace("F_error"),))  # in estimated-force only
 _SPEED = Panel(
     "motor speed",
     (Trace("omega"), Trace("omega_ref", LineRole.SET_POINT)),
@@ -22,6 +23,7 @@ PANELS = Panels(
     ("emb-caliper",),
     (
         _FORCE,
+        _ESTIMATE,
         _SPEED,
         Panel(
             "current", (Trace("i"), Trace("i_ref", LineRole.SET_POINT)), saturation="sat_current"
@@ -35,6 +37,7 @@ PMSM_PANELS = Panels(
     ("emb-caliper-pmsm",),
     (
         _FORCE,
+        _ESTIMATE,
         _SPEED,
         Panel(
             "currents",
@@ -48,6 +51,18 @@ PMSM_PANELS = Panels(
         Panel("voltages", (Trace("v_q"), Trace("v_d", LineRole.SECOND)), saturation="sat_duty"),
         _TORQUE,
         _POWER,
+    ),
+)
+
+PARKING_PANELS = Panels(
+    "emb-parking",
+    ("emb-parking",),
+    (
+        Panel("clamp force", (Trace("F_cl"),), height=1.8),
+        Panel("disc temperature", (Trace("T_disc"),)),
+        Panel("piston travel", (Trace("travel"),)),
+        Panel("current", (Trace("i"),)),
+        Panel("shaft torque", (Trace("T_fr"), Trace("T_pawl", LineRole.SECOND))),
     ),
 )
 
@@ -74,5 +89,17 @@ PMSM_SLIDERS = Sliders(
         "motor.psi",
         "caliper.clearance",
         "ecu.current.omega_c",
+    ),
+)
+PARKING_SLIDERS = Sliders(
+    "emb-parking",
+    ("emb-parking",),
+    (
+        "screw.mu",
+        "screw.lead",
+        "disc.length",
+        "parking.F_park",
+        "parking.F_again",
+        "parking.t_again",
     ),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from bywire.authoring import Assembly, Bounds, Integral, Part, Role, Shown, Task, Wire
+from bywire.core import ops
 from bywire.plant import (
     air,
     air_orifice,
@@ -64,7 +65,7 @@ class AirBrake(Assembly[ParT, MemoryT]):
     E_walls = Integral(
         "J", "heat to the walls, work on ambient air", role=Role("sink", "walls", returns="any")
     )
-    m_fed = Integral("kg", "air taken from the reservoir")
+    m_fed = Integral("kg", "air from reservoir or compressor")
     m_out = Integral("kg", "exhausted and leaked air")
     relay = Part(relay_valve, state={"s": "spool"}, output=("feed", "exhaust"))
     feed = Part(air_orifice)
@@ -91,7 +92,9 @@ class AirBrake(Assembly[ParT, MemoryT]):
     def relayed(self, w: Any, outlet: Air) -> Flow:
         """Connect the relay valve to the air at its outlet, and return the flow into it."""
         gas, supply = w.par.gas, self.reservoir(w)
-        w.relay.u = relay_valve.Input(w.m.p_control, outlet.p - gas.p_atm)
+        # The pilot valve takes its air from the same reservoir.
+        control = ops.fmin(w.m.p_control, supply.p - gas.p_atm)
+        w.relay.u = relay_valve.Input(control, outlet.p - gas.p_atm)
         seats = relay_valve.output(w.relay.x, w.relay.par)
         w.feed.u = air_orifice.Input(supply.p, outlet.p, supply.T, outlet.T, seats.feed)
         w.outlet.u = air_orifice.Input(outlet.p, gas.p_atm, outlet.T, gas.T_0, seats.exhaust)
@@ -218,13 +221,13 @@ class BrakedWheel(Corner[ParT, MemoryT], AirBrake[ParT, MemoryT]):
 
     def power(self, w: Any) -> dict[str, float]:
         """Return the powers that do not follow from the parts."""
-        return {**super().power(w), "E_brake": -w.reaction[-1] * w.turning.x.omega}
+        return {**super().power(w), "E_brake": -w.reaction[1] * w.turning.x.omega}
 
     def record(self, w: Any) -> dict[str, float]:
         """Return the recorded signals other than states, wires and losses."""
         return {
             **super().record(w),
-            "torque": -w.reaction[-1],
+            "torque": -w.reaction[1],
             "E_wheel": road_wheel.energy(w.turning.x, w.turning.par),
         }
 

@@ -8,20 +8,24 @@ from pydantic import Field, model_validator
 
 from bywire.authoring import Duration, Length, ParameterSet, Pressure, TimeConstant, Unit
 from bywire.plant import (
+    abs_modulator,
     air,
     air_orifice,
     air_volume,
     anti_alias_filter,
     brake_chamber,
+    compressor,
     end_stop,
     floating_caliper,
+    governor,
     lever,
     relay_valve,
     road_wheel,
+    spring_brake,
 )
-from bywire.vehicle import CornerParameters
+from bywire.vehicle import CornerParameters, slip_control
 from truck_ebs.elements import push_rod
-from truck_ebs.laws import pressure_control
+from truck_ebs.laws import modulator_switch, pressure_control
 
 PadFriction = Annotated[float, Unit("1", 0.35), Field(gt=0, lt=1, allow_inf_nan=False)]
 
@@ -87,3 +91,32 @@ class TruckParameters(ParameterSet):
                 f"or lever.i = {self.lever.i:g}"
             )
         return self
+
+
+AirVolume = Annotated[float, Unit("m**3", 2e-4), Field(gt=0, allow_inf_nan=False)]
+
+
+class AbsTruckParameters(TruckParameters):
+    """The brake with a modulator at the end of its hose."""
+
+    V_hose: AirVolume
+    """volume of the hose between relay valve and modulator"""
+    modulator: abs_modulator.Parameters
+    passage: air_orifice.Parameters
+    bleed: air_orifice.Parameters
+    switch: modulator_switch.Parameters
+    slip: slip_control.Parameters
+
+
+class ParkTruckParameters(TruckParameters):
+    """The brake with spring brake, tank and compressor. The tank starts at p_s."""
+
+    V_tank: AirVolume
+    """volume of the tank"""
+    compressor: compressor.Parameters
+    governor: governor.Parameters
+    burst: air_orifice.Parameters
+    hand_valve: air_orifice.Parameters
+    spring: spring_brake.Parameters
+    push: end_stop.Parameters
+    ends: end_stop.Parameters

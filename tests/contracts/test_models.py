@@ -10,6 +10,7 @@ from bywire.simulation.compiler import find_compiler
 
 NOT_CHECKED = {
     "wedge-corner": {"linear model"},  # it rolls
+    "wedge-corner-electric": {"linear model"},  # it rolls
     "two-wheeler-by-wire": {"linear model", "exact rest"},  # it rolls
     "wedge-brake": {"linear model", "exact rest"},  # its disc turns; the steep one slides
     "two-wheeler-whole-rear": {"linear model"},  # it rolls
@@ -26,6 +27,10 @@ LONG = {
     ("wedge-brake", "order of the step"),
     ("wedge-corner", "exact rest"),
     ("wedge-corner", "lanes"),
+    ("wedge-corner-electric", "derivatives of a run"),
+    ("wedge-corner-electric", "order of the step"),
+    ("wedge-corner-electric", "exact rest"),
+    ("wedge-corner-electric", "lanes"),
     ("two-wheeler-by-wire", "lanes"),
     ("two-wheeler-whole-rear", "derivatives of a run"),
     ("two-wheeler-whole-rear", "order of the step"),

@@ -56,6 +56,32 @@ def test_the_flow_of_air_is_choked_below_the_critical_ratio():
         assert np.ptp(line.y[choked]) < 1e-9 * line.y.max()
 
 
+def test_an_accumulator_shows_both_stops():
+    (line,) = lines("accumulator")
+    assert -101_325.0 < line.y.min() < -8e4  # bubbles expand toward vacuum
+    assert line.y.max() > 5e5 + 3e5  # the spring reaches 5 bar
+
+
+def test_a_starved_pump_delivers_less():
+    delivered = [np.trapezoid(line.y, line.x) for line in lines("return_pump")]
+    full = 2.0 * 66.4e-9  # two strokes of 6.5 mm and 2 mm, mL
+    assert delivered[0] == pytest.approx(full, rel=0.02)
+    assert delivered[2] < 0.9 * delivered[0]
+
+
+def test_given_values_are_needed():
+    """Parameters of a set replace values that are declared for a figure."""
+    in_sets = {
+        name
+        for name in element_figures.VALUES
+        if getattr(ELEMENTS[name], "Parameters", None) in curves.examples()
+    }
+    assert in_sets == {
+        "flux_map",  # sets contain it without tables
+        "pad_hysteresis",  # figure with short loops
+    }
+
+
 def test_a_page_shows_the_figure_before_the_equations():
     text = elements.page(ELEMENTS["orifice"])
     assert (

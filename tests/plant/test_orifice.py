@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from bywire.core.errors import ParameterError
 from bywire.plant import brake_fluid, check_valve, orifice
+from raising import raises
 
 BAR = 1e5
 LINE = 0.011e-6 / BAR  # linear compliance of a caliper, 0.011 cm^3/bar
@@ -82,3 +84,30 @@ def test_a_check_valve_is_tight_below_its_cracking_pressure():
     flows = [check_valve.flow(check_valve.Input(p, 0.0), par, FLUID) for p in drops]
     assert flows[:3] == [0.0, 0.0, 0.0]
     assert flows[3:] == [flow(0.1 * BAR, 0.0, 1.2e-3), flow(9.8 * BAR, 0.0, 1.2e-3)]
+
+
+@pytest.mark.parametrize("drop", [1e-3, 10.0, 1e3, 1e5, 1e7])
+def test_the_pressure_drop_is_the_inverse_of_the_flow(drop):
+    par = valve(0.6e-3)
+    assert orifice.pressure_drop(flow(drop, 0.0, 0.6e-3), par, FLUID) == pytest.approx(drop)
+    assert orifice.pressure_drop(-flow(drop, 0.0, 0.6e-3), par, FLUID) == pytest.approx(-drop)
+
+
+def test_a_cone_opens_up_to_the_area_of_the_orifice():
+    par, alpha = valve(0.6e-3), math.pi / 4
+    full = par.d / (4 * math.sin(alpha))
+    openings = [orifice.conical_opening(share * full, alpha, par) for share in (0.0, 0.5, 1.0, 2.0)]
+    assert openings == pytest.approx([0.0, 0.5, 1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("d", 0.0), ("d", -1e-3), ("C_d", 1.1), ("C_d", 0.0), ("Re_cr", 0.0)]
+)
+def test_an_orifice_that_cannot_exist_is_rejected(name, value):
+    with raises(ParameterError, name=name):
+        orifice.Parameters.create({"d": 1e-3, "C_d": 0.65, "Re_cr": 100.0} | {name: value})
+
+
+def test_a_fluid_needs_an_absolute_pressure():
+    with raises(ParameterError, name="p_atm"):
+        FLUID.replace({"p_atm": -1e5})

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from bywire.control import derating, speed_observer
 from bywire.control import field_oriented as foc
 from bywire.plant import inverter, pmsm
 
@@ -37,6 +38,7 @@ def motor(values):
 def law(values, **changes):
     own = {
         "omega_c": 1 / (3 * T),
+        "R_a": 0.0,
         "p": values["p"],
         "R_hat": values["R"],
         "L_d_hat": values["L_d"],
@@ -44,6 +46,7 @@ def law(values, **changes):
         "psi_hat": values["psi"],
         "lead": 1.5,
         "i_max": 240.0,
+        "voltage": "circle",
         "k_fw": 0.0,
         "reserve": 0.95,
     }
@@ -55,14 +58,25 @@ class Run:
 
     V_dc = 24.0
 
-    def __init__(self, values, i_ref, omega=0.0, stage=None, ticks=60, offset=0.0, **own):
+    def __init__(
+        self,
+        values,
+        i_ref,
+        omega=0.0,
+        stage=None,
+        ticks=60,
+        offset=0.0,
+        i_fw=0.0,
+        start=None,
+        **own,
+    ):
         self.par, self.law = motor(values), law(values, **own)
         self.stage = inverter.Parameters.create(POWER_STAGE | (stage or {}))
         self.omega = omega
         emf = values["p"] * omega * values["psi"]
         # It starts without current: the voltage equals the back EMF, in the middle of each sample.
         held = [self._at_start(emf, k) for k in (-1.5, -0.5)]
-        x, state = pmsm.State(0.0, 0.0), foc.State(0.0, 0.0, 0.0)
+        x, state = start or pmsm.State(0.0, 0.0), foc.State(0.0, 0.0, i_fw)
         rows, waiting = [], held[1]
         self.power_in = self.copper = self.shaft = self.lost = 0.0
         for k in range(ticks):
@@ -183,10 +197,10 @@ def test_dead_time_takes_voltage_along_the_current():
     [(120.0, -67.27, 99.37, 54.48), (240.0, -150.99, 186.56, 160.61)],
 )
 def test_interior_magnets_use_their_reluctance(amplitude, i_d, i_q, torque):
-    ref = foc.set_points(amplitude, 0.0, 240.0, law(TRACTION))
+    ref = foc.set_points(amplitude, 0.0, 240.0, 1.0, law(TRACTION))[:2]
     assert ref == pytest.approx((i_d, i_q), rel=1e-3)
     assert pmsm.airgap_torque(pmsm.State(*ref), motor(TRACTION)) == pytest.approx(torque, rel=1e-3)
-    negative = foc.set_points(-amplitude, 0.0, 240.0, law(TRACTION))
+    negative = foc.set_points(-amplitude, 0.0, 240.0, 1.0, law(TRACTION))[:2]
     assert negative == (ref[0], -ref[1])
 
 
@@ -248,3 +262,121 @@ def test_the_largest_torque_at_high_speed(rpm, torque, i_d, i_q):
     best = largest_torque(rpm * math.pi / 30)
     assert best[0] == pytest.approx(torque, rel=2e-3)
     assert best[1:] == pytest.approx((i_d, i_q), abs=1.0)
+
+
+class Traction(Run):
+    """The traction motor, whose field weakening regulates the voltage to 300 V / sqrt(3)."""
+
+    V_dc = 300.0 / 0.95
+
+
+@pytest.mark.parametrize(("rpm", "torque"), [(6000, 84.33), (12000, 39.43)])
+def test_field_weakening_finds_the_largest_torque(rpm, torque, monkeypatch):
+    """The circle of the current limits it at 6000 rpm, and the voltage alone (MTPV) at 12000."""
+    monkeypatch.setattr("test_pmsm.T", 2.5e-5)  # held voltages turn by 5 degrees
+    monkeypatch.setattr("test_pmsm.SUBSTEPS", 2)
+    near = pmsm.State(-220.0, 60.0)
+    more = {"k_fw": 600.0, "i_max": 240.0, "reserve": 0.95, "i_fw": -70.0, "start": near}
+    run = Traction(TRACTION, 240.0, rpm * math.pi / 30, ticks=7000, **more)
+    last = [pmsm.State(*x) for x in zip(run.i_d[-800:], run.i_q[-800:], strict=True)]
+    found = np.mean([pmsm.airgap_torque(x, run.par) for x in last])
+    assert found == pytest.approx(torque, rel=2e-3)
+    assert max(math.hypot(*x) for x in last) < 240.5
+    assert max(x.i_d for x in last) < -TRACTION["psi"] / TRACTION["L_d"]
+
+
+def test_maximum_torque_per_voltage():
+    """Without resistance, no other currents of the same flux give more torque."""
+    par, limit = law(TRACTION), 0.045
+    psi_d = par.psi_hat + par.L_d_hat * foc.weakest_field(limit, par)
+    angles = np.linspace(-math.pi, math.pi, 200001)
+    d, q = limit * np.cos(angles), limit * np.sin(angles)
+    other = (d - par.psi_hat) / par.L_d_hat, q / par.L_q_hat
+    best = np.argmax((par.psi_hat + (par.L_d_hat - par.L_q_hat) * other[0]) * other[1])
+    assert psi_d == pytest.approx(d[best], abs=1e-6)
+    surface = law(SERVO)
+    assert foc.weakest_field(limit, surface) == pytest.approx(-SERVO["psi"] / SERVO["L_d"])
+
+
+def test_set_points_follow_field_weakening_without_jumps():
+    par = law(TRACTION)
+    currents = np.array(
+        [foc.set_points(120.0, -i, 200.0, 0.046, par)[:2] for i in np.linspace(0.0, 400.0, 4001)]
+    )
+    assert np.abs(np.diff(currents, axis=0)).max() < 6.4  # the slope of the circle at its end
+    assert np.hypot(*currents.T).max() <= 200.0 * (1 + 1e-12)
+    assert currents[-1, 1] == 0.0
+
+
+def test_a_derated_limit_lowers_the_current():
+    cold = {"T_ref_hat": 293.15, "T_a_hat": 293.15, "T_derate": 373.15, "T_limit": 423.15}
+    thermal = derating.Parameters.create(
+        cold
+        | {"law": "current", "R_hat": 0.36, "a_R_hat": 0.00393, "C_w_hat": 15.0}
+        | {"C_h_hat": 150.0, "G_wh_hat": 1 / 3, "G_ha_hat": 0.5, "i_least": 2.0}
+    )
+    warm = derating.State(105.0, 80.0)  # halfway between T_derate and T_limit
+    limit = derating.output(warm, derating.Input(0.0, 10.0), 1e-9, thermal)[1].i_max
+    assert limit == pytest.approx(6.0)
+    assert foc.set_points(10.0, 0.0, limit, 1.0, law(SERVO))[:2] == pytest.approx((0.0, limit))
+
+
+def test_a_voltage_of_zero_has_no_direction():
+    u = foc.Input(0.0, 0.0, 0.0, 0.3, 0.0, 24.0, 10.0)
+    for voltage in ("circle", "hexagon"):
+        state, out = foc.output(foc.State(0.0, 0.0, 0.0), u, T, law(SERVO, voltage=voltage))
+        assert (out.v_alpha, out.v_beta, *state) == (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_the_hexagon_reaches_six_steps():
+    angles = np.linspace(0.0, 2 * math.pi, 3601)[:-1]
+
+    def fundamental(size):
+        v = np.array([foc.hexagon(size * math.cos(a), size * math.sin(a), 24.0) for a in angles])
+        return (v @ [1, 1j] * np.exp(-1j * angles)).mean()
+
+    assert fundamental(13.8) == pytest.approx(13.8, rel=1e-12)  # within V/sqrt(3) = 13.856 V
+    assert abs(fundamental(1e5)) == pytest.approx(2 / math.pi * 24.0, rel=1e-4)
+    assert foc.hexagon(16.0, 0.0, 24.0) == pytest.approx((16.0, 0.0))  # a corner, 2/3 V
+
+
+def test_the_hexagon_gives_more_current_at_speed():
+    amount = {"ticks": 400, "i_max": 40.0}
+    circle, hexagon = (
+        Run(SERVO, 40.0, 350.0, voltage=name, **amount) for name in ("circle", "hexagon")
+    )
+    assert hexagon.i_q[-1000:].mean() > 1.15 * circle.i_q[-1000:].mean()
+
+
+def test_an_observer_of_the_speed_is_quiet_and_lags_as_stated():
+    par = speed_observer.Parameters.create({"omega_o": 500.0, "turn": 2 * math.pi})
+
+    def estimate(angles, x):
+        found = []
+        for theta in angles:
+            x, out = speed_observer.output(x, speed_observer.Input(theta), T, par)
+            found.append(out.omega)
+        return np.array(found)
+
+    t = np.arange(2000) * T
+    start = speed_observer.State(-100.0 * T, 100.0)
+    turning = (100.0 * t) % (2 * math.pi)  # a resolver that starts again after each turn
+    assert estimate(turning, start) == pytest.approx(np.full(t.size, 100.0), rel=1e-9)
+    count = 2 * math.pi / 4096
+    rounded = count * np.floor(turning / count + 0.5)
+    assert np.abs(np.diff(rounded)[:50] / T - 100.0).max() > 7.0
+    assert np.abs(estimate(rounded, start) - 100.0).max() < 1.0
+    accelerating = estimate(0.5 * 1e4 * t**2, speed_observer.State(0.0, 0.0))
+    lag = (1e4 * t[-1] - accelerating[-1]) / 1e4
+    assert lag == pytest.approx(2 / par.omega_o, rel=0.03)
+
+
+def test_active_damping_speeds_up_the_rejection_of_disturbances():
+    """An error of the flux linkage decays with L/R = 67 ms, or with L/(R + R_a) = 2.3 ms."""
+    wrong, left = 0.95 * TRACTION["psi"], {}
+    for R_a in (0.0, 0.5):
+        run = Traction(TRACTION, 10.0, 100.0, ticks=120, psi_hat=wrong, R_a=R_a, i_max=240.0)
+        left[R_a] = abs(run.end.i_q - foc.set_points(10.0, 0.0, 240.0, 1.0, run.law).i_q)
+    peak = 3 * 100.0 * 0.05 * TRACTION["psi"] / (TRACTION["L_q"] / (3 * T))  # voltage over k_p
+    assert left[0.0] == pytest.approx(peak * math.exp(-0.012 / 0.067), rel=0.1)
+    assert left[0.5] < 0.03 * peak

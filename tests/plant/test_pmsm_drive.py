@@ -1,12 +1,15 @@
 """The synchronous motor's drive in the engine: independent reference, energy, saturation, heat."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from bywire.core.errors import ParameterError
-from bywire.plant import flux_map, pmsm
+from bywire.plant import dc_link, flux_map, pmsm
+from bywire.simulation.advance import Change
 from bywire.simulation.run import simulate
 from raising import raises
 from systems.pmsm_drive import SERVO, T_S, parameters, run
@@ -86,7 +89,9 @@ def test_a_transient_agrees_with_an_independent_integration(law):
         currents_of if law == "saturated" else lambda d, q: (d / L, q / L), 2e-5, 0.05, 7.0, 150.0
     )
     drive = saturated if law == "saturated" else parameters
-    found = simulate(run(drive(shaft__J=2e-5), 7.0, 0.05, 150.0, duration=99 * T_S, step=5e-6))
+    found = simulate(
+        run(drive(shaft__J=2e-5, link__C=1e3), 7.0, 0.05, 150.0, duration=99 * T_S, step=5e-6)
+    )
     i_d, i_q, omega = np.array(exact.rows).T
     # The step's numerical error, and with a map the interpolation error of its coarse tables.
     within = 1.5e-2 if law == "saturated" else 2e-3
@@ -99,7 +104,7 @@ CASES = {
     "linear": (parameters, {}, 1e-10),
     "dead time": (parameters, {"inverter__law": "dead time", "inverter__V_f": 0.4}, 1e-6),
     "iron": (parameters, {"motor__iron": "drag", "motor__c_h": 2.0, "motor__c_e": 1e-2}, 1e-8),
-    "battery": (parameters, {"supply__R_bat": 0.05}, 1e-8),
+    "diode": (parameters, {"link__law": "diode", "link__chopper": "resistor"}, 1e-6),
     "saturated": (saturated, {}, 1e-6),
 }
 
@@ -143,6 +148,78 @@ def test_heat_weakens_magnets_and_raises_the_resistance():
     assert per_current[0] / per_current[1] == pytest.approx(K, rel=1e-5)
     lost = [np.diff(each["E_copper"])[-1] / each["i_q"][-2:].mean() ** 2 for each in (hot, cold)]
     assert lost[0] / lost[1] == pytest.approx(R, rel=1e-3)
+
+
+def test_diodes_rectify_a_back_emf_above_the_bus():
+    """Without gate signals, above V/sqrt(3): square phase voltages against the current."""
+    threshold = 24.0 / math.sqrt(3) / (4 * SERVO["psi"])
+    assert threshold == pytest.approx(541.7, rel=1e-4)
+
+    def steady(omega):
+        par = parameters(inverter__gates=0.0, shaft__J=10.0, link__R_s=1e-3)
+        found = simulate(run(par, omega=omega, duration=0.05))
+        return [found[name][-200:].mean() for name in ("torque", "i_dc")]
+
+    for omega in (0.5 * threshold, 0.95 * threshold):
+        torque, i_dc = steady(omega)
+        assert abs(torque) < 0.06 * 1.5 * 4 * SERVO["psi"] * 10.0
+        assert -0.5 < i_dc < 0.0
+    for omega in (3.0 * threshold, 4.0 * threshold):  # current flows in all phases all the time
+        torque, i_dc = steady(omega)
+        R, X, V = SERVO["R"], 4 * omega * L, 2 / math.pi * 24.0
+        E = 4 * omega * SERVO["psi"]
+        # (R i + V)^2 + (X i)^2 = E^2
+        a, b, c = R * R + X * X, 2 * R * V, V * V - E * E
+        i = (-b + math.sqrt(b * b - 4 * a * c)) / (2 * a)
+        assert torque == pytest.approx(-1.5 * (R * i + V) * i / omega, rel=5e-2)
+        assert i_dc == pytest.approx(-3 / math.pi * i, rel=5e-2)
+
+
+def test_field_weakening_that_is_lost_at_speed_brakes():
+    """Gate signals end while field weakening drives the motor above its back-EMF limit."""
+    par = parameters(current__k_fw=300.0, shaft__J=1e-3, inverter__V_f=0.7)
+    lost = Change(0.02, par.replace({"inverter.gates": 0.0}))
+    found = simulate(run(par, 2.0, 0.0, 650.0, duration=0.03, changes=(lost,)))
+    before, after = found.time < 0.0199, found.time > 0.021
+    assert found["torque"][before][-20:].mean() > 0.04
+    assert found["i_d"][before][-1] < -3.0
+    assert found["torque"][after].max() < -0.05
+    assert found["i_dc"][after].mean() < -1.0
+    assert residual(found) < 2e-4  # corners of the diodes at 10 us; 1e-6 at 1 us
+
+
+BRAKING = {"shaft__J": 2e-5}
+
+
+def test_a_regenerating_motor_lifts_a_bus_that_takes_no_current():
+    """The capacitor receives the kinetic energy minus the copper loss."""
+    runs = {
+        name: simulate(run(parameters(**BRAKING, **link), -7.0, 0.0, 400.0, duration=0.02))
+        for name, link in {
+            "battery": {},
+            "diode": {"link__law": "diode"},
+            "chopper": {"link__law": "diode", "link__chopper": "resistor"},
+        }.items()
+    }
+    top = {name: found["v_bus"].max() for name, found in runs.items()}
+    assert top["battery"] == pytest.approx(24.0 + 0.05 * 7, abs=0.3)
+    found = runs["diode"]
+    kinetic = 0.5 * 2e-5 * (found["omega"][0] ** 2 - found["omega"][-1] ** 2)
+    magnetic = 0.75 * L * (found["i_d"][-1] ** 2 + found["i_q"][-1] ** 2)
+    to_link = kinetic - magnetic - found["E_copper"][-1] + found["E_source"][-1]
+    stored = 0.5 * 2e-3 * (found["v_bus"][-1] ** 2 - 24.0**2)
+    assert stored == pytest.approx(to_link - found["E_supply"][-1], rel=1e-4)
+    assert 31.0 < top["chopper"] < top["diode"]
+    x = dc_link.State(found["v_bus"])
+    par = parameters(link__law="diode", link__V_most=32.0).link
+    (text,) = dc_link.watch(found.time, x, par)
+    assert "takes no current" in text
+    assert dc_link.watch(found.time, dc_link.State(runs["battery"]["v_bus"]), par) == []
+
+
+def test_a_chopper_below_the_supply_is_rejected():
+    with raises(ParameterError, name="link.V_on", valid="> V_s"):
+        parameters(link__chopper="resistor", link__V_on=20.0)
 
 
 @pytest.mark.parametrize("i", [(-20.0, GRID[4]), (GRID[4], -20.0), (0.0, 0.0)])

@@ -74,5 +74,5 @@ def test_the_area_ratio_raises_the_output_pressure():
 
 
 def test_a_preload_without_overlap_is_rejected():
-    with pytest.raises(ParameterError, match=r"relay_valve|overlap"):
+    with pytest.raises(ParameterError, match="overlap"):
         relay_valve.Parameters.create(NUMBERS | {"overlap": 0.0})

@@ -1,4 +1,4 @@
-"""A synchronous motor with battery, inverter and field-oriented control turns a flywheel."""
+"""A synchronous motor with a DC link, inverter and field-oriented control turns a flywheel."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from bywire.authoring import (
     zeros,
 )
 from bywire.control import field_oriented
-from bywire.plant import battery_supply, inverter, motor_heat, pmsm, shaft
+from bywire.plant import dc_link, inverter, motor_heat, pmsm, shaft
 from bywire.simulation.run import Run
 
 T_S = 1e-4
@@ -28,7 +28,7 @@ T_S = 1e-4
 class Parameters(ParameterSet):
     """All parameters."""
 
-    supply: battery_supply.Parameters
+    link: dc_link.Parameters
     inverter: inverter.Parameters
     motor: pmsm.Parameters
     heat: motor_heat.Parameters
@@ -69,7 +69,7 @@ class PmsmDrive(Assembly[Parameters, Memory]):
     E_load = Integral("J", "energy to the load", role=Role("sink", "load", returns="any"))
     E_iron = Integral("J", "eddy currents", role=Role("sink", "iron"))
     E_hysteresis = Integral("J", "hysteresis of the iron", role=Role("sink", "hysteresis"))
-    supply = Part(battery_supply, loss="E_supply")
+    link = Part(dc_link, loss={"E_supply": "supply_loss", "E_chopper": "chopper_loss"})
     inverter = Part(inverter, loss="E_inverter")
     motor = Part(pmsm, loss="E_copper")
     heat = Part(motor_heat, loss="E_air")
@@ -84,7 +84,7 @@ class PmsmDrive(Assembly[Parameters, Memory]):
     records: ClassVar[tuple[str, ...]] = (
         *("i_d", "i_q", "theta", "omega", "v_d", "v_q", "v_bus", "i_dc", "torque"),
         *("T_winding", "T_housing", "i_fw", "E_source", "E_load", "E_iron", "E_hysteresis"),
-        *("E_supply", "E_inverter", "E_copper", "E_damping", "E_stored"),
+        *("E_supply", "E_chopper", "E_inverter", "E_copper", "E_damping", "E_stored"),
     )
 
     def wire(self, w):
@@ -94,8 +94,8 @@ class PmsmDrive(Assembly[Parameters, Memory]):
         i, theta_e = w.motor.x, w.motor.par.p * w.shaft.xe.theta
         shares = w.m.alpha, w.m.beta
         w.i_dc = inverter.bus_current(*shares, i.i_d, i.i_q, theta_e, w.inverter.par)
-        w.supply.u = battery_supply.Input(w.i_dc)
-        w.v_bus = battery_supply.output(w.supply.u, w.supply.par).v_bus
+        w.link.u = dc_link.Input(w.i_dc)
+        w.v_bus = w.link.x.v
         demands = w.v_bus * w.m.alpha, w.v_bus * w.m.beta
         w.inverter.u = inverter.Input(*demands, i.i_d, i.i_q, theta_e, w.v_bus)
         out = inverter.output(w.inverter.u, w.inverter.par)
@@ -114,7 +114,7 @@ class PmsmDrive(Assembly[Parameters, Memory]):
         """Return the powers that do not follow from the parts."""
         omega = w.shaft.x.omega
         return {
-            "E_source": battery_supply.power_source(w.supply.u, w.supply.par),
+            "E_source": dc_link.power_source(w.link.x, w.link.par),
             "E_load": w.m.load * omega,
             "E_iron": pmsm.iron_loss(w.motor.x, omega, w.motor.par),
             "E_hysteresis": -w.reaction[0] * omega,
@@ -130,8 +130,7 @@ def tick(x, m, u, par):
     """Apply the voltages of the last tick, and compute the next ones."""
     theta_e = par.motor.p * x.theta
     i_alpha, i_beta = inverter.rotated(x.i_d, x.i_q, -theta_e)
-    i_dc = inverter.bus_current(m.alpha, m.beta, x.i_d, x.i_q, theta_e, par.inverter)
-    V_dc = battery_supply.output(battery_supply.Input(i_dc), par.supply).v_bus
+    V_dc = x.v
     state, out = field_oriented.output(
         field_oriented.State(m.z_d, m.z_q, m.i_fw),
         field_oriented.Input(u.i_set, i_alpha, i_beta, theta_e, x.omega, V_dc, par.current.i_max),
@@ -165,8 +164,19 @@ HEAT = {
     "T_a": 293.15,
     "T_most": 428.15,
 }
+LINK = {
+    "law": "battery",
+    "V_s": 24.0,
+    "R_s": 0.05,
+    "C": 2e-3,
+    "chopper": "off",
+    "V_on": 30.0,
+    "R_on": 1.0,
+    "V_most": 35.0,
+}
 CURRENT = {
     "omega_c": 1 / (3 * T_S),
+    "R_a": 0.0,
     "p": 4.0,
     "R_hat": SERVO["R"],
     "L_d_hat": SERVO["L_d"],
@@ -174,6 +184,7 @@ CURRENT = {
     "psi_hat": SERVO["psi"],
     "lead": 1.5,
     "i_max": 20.0,
+    "voltage": "circle",
     "k_fw": 0.0,
     "reserve": 0.95,
 }
@@ -181,9 +192,10 @@ CURRENT = {
 
 def parameters(**changes):
     """Return the drive with a servo motor; changes by dotted name with ``__`` for the dot."""
-    values = {"supply.V_bat": 24.0, "supply.R_bat": 0.0, "T_s": T_S}
+    values = {"T_s": T_S}
     groups = {
-        "inverter": STAGE | {"gates": 1.0, "i_off": 3.0},
+        "link": LINK,
+        "inverter": STAGE | {"gates": 1.0, "i_off": 0.5},
         "motor": MOTOR,
         "heat": HEAT,
         "shaft": {"J": 7.06e-6, "d": 0.0},
@@ -197,11 +209,12 @@ def parameters(**changes):
 def turning(omega, par, theta=0.0):
     """Return state and memory of a shaft that turns without current: the voltage is the emf."""
     state = PmsmDrive.state(
+        link=dc_link.State(par.link.V_s),
         motor=pmsm.State(0.0, 0.0),
         heat=motor_heat.cold(par.heat),
         shaft=shaft.State(theta, omega),
     )
-    share = par.motor.p * omega * par.motor.psi / par.supply.V_bat
+    share = par.motor.p * omega * par.motor.psi / par.link.V_s
     omega_e, T = par.motor.p * omega, par.T_s
     angle = par.motor.p * theta + np.pi / 2.0
     held = [angle + omega_e * T * middle for middle in (-0.5, 0.5)]

@@ -73,7 +73,7 @@ def test_the_battery_stores_what_is_recovered_without_its_losses(stops):
 
 
 def test_a_lost_motor_leaves_an_impulse_that_the_reports_delay():
-    result = stop(["motor.stuck@3s"])
+    result = stop(["wheel_motor.stuck@3s"])
     run = result.recording.sel(time=slice(3.0, 4.0))
     lack = DEMAND - run["T_m"] - run["T_f"]
     T_0 = float(run["T_m"][0])
@@ -83,7 +83,7 @@ def test_a_lost_motor_leaves_an_impulse_that_the_reports_delay():
 
 
 def test_only_reports_replace_a_lost_motor():
-    result = stop(["motor.stuck@3s"], regeneration__blending__law="commanded")
+    result = stop(["wheel_motor.stuck@3s"], regeneration__blending__law="commanded")
     run = result.recording.sel(time=4.0, method="nearest")
     assert float(run["T_m"]) == pytest.approx(0.0, abs=1e-6)
     assert float(run["T_f"]) < 0.1 * DEMAND

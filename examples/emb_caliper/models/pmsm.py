@@ -75,6 +75,7 @@ class EmbCaliperPmsm(CaliperBrake[Par, Any]):
         "F_hat",
         "F_curve",
         "F_balance",
+        "T_load",
         "balance_valid",
         "on_estimate",
         "theta_0_hat",

@@ -171,6 +171,6 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
 
 SOURCE = Source(
     name="line2008",
-    summary="electro-mechanical caliper under cascaded PI control, statements in the abstract",
+    summary="electro-mechanical caliper under cascaded PI control, claims in the abstract",
     reproduce=reproduce,
 )

@@ -171,7 +171,7 @@ _SYNCHRONOUS = {
     "inverter.V_f": chosen(0.0, "MOSFETs conduct in both directions"),
     "inverter.i_th": chosen(0.05, "2 C_oss V_dc / t_d with 0.6 nF"),
     "inverter.gates": chosen(1.0, "a fault switches them off"),
-    "inverter.i_off": chosen(2.0, "above V_dc h / L for a step of 10 us"),
+    "inverter.i_off": chosen(1.0, "half of V_dc h / L for a step of 10 us"),
     "motor.law": chosen("linear", "no map available"),
     "motor.map.i_d": chosen((), "no map available"),
     "motor.map.i_q": chosen((), "no map available"),
@@ -195,12 +195,14 @@ _FIELD_ORIENTED = {
         lambda par: 1.0 / (3.0 * par.ecu.T_current), "phase margin of 61.4 degrees"
     ),
     "ecu.current.p": derived(lambda par: par.motor.p, _KNOWN),
+    "ecu.current.R_a": chosen(0.0, "the speed control rejects disturbances"),
     "ecu.current.R_hat": derived(lambda par: par.motor.R, _KNOWN),
     "ecu.current.L_d_hat": derived(lambda par: par.motor.L_d, _KNOWN),
     "ecu.current.L_q_hat": derived(lambda par: par.motor.L_q, _KNOWN),
     "ecu.current.psi_hat": derived(lambda par: par.motor.psi, _KNOWN),
     "ecu.current.lead": chosen(1.5, "a delay of one sample, and half a sample of holding"),
     "ecu.current.i_max": derived(lambda par: par.ecu.speed.i_max, "limit of the speed control"),
+    "ecu.current.voltage": chosen("circle", "sinusoidal voltages"),
     "ecu.current.k_fw": chosen(0.0, "off: the back EMF stays below the voltage limit"),
     "ecu.current.reserve": chosen(0.95, "without effect while k_fw = 0"),
 }

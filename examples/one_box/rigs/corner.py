@@ -27,13 +27,16 @@ class OneBoxCornerParameters(ModulatorParameters):
     valves: valve_pressure.Parameters
 
 
+_DISC = 2  # place of the disc among the dry frictions
+
+
 class OneBoxCorner(Corner[OneBoxCornerParameters, Any], Modulator[OneBoxCornerParameters, Any]):
-    """The brake at a wheel. A second dry friction acts on the disc."""
+    """The brake at a wheel. A third dry friction acts on the disc."""
 
     name: ClassVar[str] = "one-box-corner"
     Memory: ClassVar = antilock.Memory
     Stimulus: ClassVar = antilock.Stimulus
-    frictions: ClassVar[tuple[str, ...]] = ("omega", "omega_w")
+    frictions: ClassVar[tuple[str, ...]] = ("omega", "omega_p", "omega_w")
 
     disc = Part(brake_disc)
     turning = Part(
@@ -65,20 +68,20 @@ class OneBoxCorner(Corner[OneBoxCornerParameters, Any], Modulator[OneBoxCornerPa
         w.encoder.u = wheel_encoder.Input(w.turning.x.omega)
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the bounds of the frictions of shaft and disc."""
+        """Return the bounds of the frictions of shaft, pump and disc."""
         rolling = road_wheel.rolling_resistance(w.N_x, w.turning.par)
         most = brake_disc.output(w.disc.u, w.disc.par).torque + rolling
         return (*super().friction(w), (-most, most))
 
     def power(self, w: Self) -> dict[str, float]:
         """Return the powers that do not follow from the parts."""
-        return {**super().power(w), "E_brake": -w.reaction[1] * w.turning.x.omega}
+        return {**super().power(w), "E_brake": -w.reaction[_DISC] * w.turning.x.omega}
 
     def record(self, w: Self) -> dict[str, float]:
         """Return the recorded signals other than states, wires and losses."""
         return {
             **super().record(w),
-            "T_brake": -w.reaction[1],
+            "T_brake": -w.reaction[_DISC],
             "E_wheel": road_wheel.energy(w.turning.x, w.turning.par),
         }
 

@@ -1,32 +1,35 @@
-"""Stop from a speed: a pressure demand at time zero, on a dry road."""
+"""Stop from a speed: a pressure demand at time zero, on any surface."""
 
 from __future__ import annotations
 
+import json
 import math
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import numpy as np
+import xarray as xr
 from pydantic import Field
 
-from bywire.authoring import (
-    Case,
-    Experiment,
-    Figures,
-    Kpi,
-    Recordings,
-    Unit,
-)
+from bywire.authoring import Case, Experiment, Figures, Kpi, Recordings, Unit
+from bywire.plant import adhesion, road
+from bywire.vehicle import CornerParameters, surfaces
+from truck_ebs import model
 from truck_ebs.experiments.ebs_response import DemandOptions, demanded
-from truck_ebs.model import TruckEbs, rolling
-from truck_ebs.parameters import TruckParameters
+from truck_ebs.models import abs as with_abs
+from truck_ebs.models import park
+from truck_ebs.parameters import AbsTruckParameters, ParkTruckParameters, TruckParameters
 
 RidingSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
+_SLOW = 2.0  # m/s, below which a wheel may lock
 FIGURES = Figures(
-    undefined="the vehicle does not stop within the recording",
+    undefined="the vehicle does not stop within the recording. Increase options.duration",
     stopping_distance=("m", "Distance from the demand to standstill."),
     mean_deceleration=("m/s**2", "Initial speed squared over twice the stopping distance."),
+    braking_efficiency=("%", "Ratio of the ideal stopping distance on this road to the actual."),
     peak_slip=("1", "Largest slip above a tenth of the initial speed."),
+    locked_time=("s", f"Time with a locked wheel at speeds above {_SLOW:g} m/s."),
     clamp_force=("N", "Largest clamp force."),
+    air_used=("kg", "Air from reservoir or compressor until the stop."),
 )
 
 
@@ -35,19 +38,34 @@ class Options(DemandOptions):
 
     v_0: RidingSpeed
     """initial speed"""
+    surface: road.SurfaceName
+    """road surface; own keeps the set's surface"""
+
+
+def started(par: TruckParameters, v: float) -> tuple[Any, tuple[Any, Any]]:
+    """Return the variant that has these parameters, and its start at a speed [m/s]."""
+    if hasattr(par, "modulator"):
+        return with_abs.TruckAbs(), with_abs.rolling(cast(AbsTruckParameters, par), v)
+    if hasattr(par, "spring"):
+        return park.TruckPark(), park.rolling(cast(ParkTruckParameters, par), v)
+    return model.TruckEbs(), model.rolling(par, v)
 
 
 def cases(par: TruckParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the single run."""
+    """Return the single run of any variant."""
+    changed = par.replace(surfaces.laid("corner.road", options.surface))
+    truck, (state, memory) = started(changed, options.v_0)
+    demand = demanded(options.p_brake, 0.0)
     return (
         Case(
             "run",
-            TruckEbs(),
-            par,
-            *rolling(par, options.v_0),
-            demanded(options.p_brake, 0.0),
+            truck,
+            changed,
+            state,
+            memory,
+            demand,
             options.duration,
-            start=lambda par: rolling(par, options.v_0),
+            start=lambda par: started(par, options.v_0)[1],
         ),
     )
 
@@ -55,24 +73,38 @@ def cases(par: TruckParameters, options: Options, _: object = None) -> tuple[Cas
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the key figures of the stop."""
     run = recordings["run"]
-    v, s = run["v_x"].values, run["s"].values
-    still = np.flatnonzero(v <= 1e-3)
-    distance = float(s[still[0]]) if still.size and s[still[0]] > 0.0 else math.nan
-    fast = v > 0.1 * options.v_0
+    t, v = run["time"].values, run["v_x"].values
+    still = np.flatnonzero((v <= 1e-3) & (t > 0.0))
+    end = still[0] if still.size else -1
+    distance = float(run["s"].values[end]) if still.size else 0.0
+    distance = distance if distance > 0.0 else math.nan
+    locked = (run["omega"].values == 0.0) & (v > _SLOW)
     return FIGURES(
         stopping_distance=distance,
         mean_deceleration=options.v_0**2 / (2.0 * distance),
-        peak_slip=float(run["slip"].values[fast].max(initial=0.0)),
+        braking_efficiency=100.0 * _ideal(options.v_0, run) / distance,
+        peak_slip=float(run["slip"].values[v > 0.1 * options.v_0].max(initial=0.0)),
+        locked_time=float(np.sum(np.diff(t)[locked[:-1]])),
         clamp_force=float(run["F_cl"].max()),
+        air_used=float(run["m_fed"].values[end]) if still.size else math.nan,
     )
+
+
+def _ideal(v_0: float, run: xr.Dataset) -> float:
+    """Return the shortest stopping distance [m], with the tire at its peak from the demand on."""
+    corner = CornerParameters.model_validate(json.loads(run.attrs["parameters"])["corner"])
+    ground = road.surface(0.0, corner.road)
+    mu = adhesion.adhesion(adhesion.peak_slip(ground, corner.tyre), ground, corner.tyre)
+    return v_0**2 / (2.0 * corner.body.g * mu)
 
 
 EXPERIMENT = Experiment(
     name="ebs-stop",
     assembly="truck-ebs",
-    summary="stop from {v_0:km/h} with {p_brake:bar}",
+    variants=("truck-abs", "truck-park"),
+    summary="stop from {v_0:km/h} with {p_brake:bar} on {surface}",
     options=Options,
-    defaults=Options(v_0=80.0 / 3.6, p_brake=5e5, duration=7.0),
+    defaults=Options(v_0=80.0 / 3.6, p_brake=5e5, surface="own", duration=7.0),
     cases=cases,
     judge=judge,
     kpis=FIGURES.units,

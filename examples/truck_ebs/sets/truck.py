@@ -9,6 +9,12 @@ _ISO = "reference state of ISO 8778"
 _CLASS = "a disc brake of this class"
 _ROAD = "dry asphalt, Burckhardt's values for a car tire"
 _STRETCH = {"c1": 1.2801, "c2": 23.99, "c3": 0.52, "B": 10.0, "C": 1.9, "D": 1.0, "E": 0.97}
+ORIFICE = {
+    "C": chosen(4e-8, "no source"),
+    "b": chosen(0.3, "no source"),
+    "r_lam": chosen(0.999, "the default of Simscape's orifice"),
+}
+"""values of an orifice"""
 NUMBERS = {
     "gas.p_ref": chosen(1e5, _ISO),
     "gas.rho_0": chosen(1.185, _ISO),
@@ -23,12 +29,8 @@ NUMBERS = {
     "relay.a": chosen(1.0, "output pressure equals control pressure (law mechanical)"),
     "relay.p_crack": chosen(0.1e5, "no source (law mechanical)"),
     "relay.p_fr": chosen(0.04e5, "no source (law mechanical)"),
-    "feed.C": chosen(4e-8, "no source"),
-    "feed.b": chosen(0.3, "no source"),
-    "feed.r_lam": chosen(0.999, "the default of Simscape's orifice"),
-    "exhaust.C": chosen(4e-8, "no source"),
-    "exhaust.b": chosen(0.3, "no source"),
-    "exhaust.r_lam": chosen(0.999, "the default of Simscape's orifice"),
+    **{f"feed.{key}": value for key, value in ORIFICE.items()},
+    **{f"exhaust.{key}": value for key, value in ORIFICE.items()},
     "volume.law": chosen("isothermal", "the metal of chamber and hose holds the temperature"),
     "volume.G_w": chosen(10.0, "no source (law heat)"),
     "chamber.V_0": chosen(0.55e-3, "no source, with the hose"),

@@ -115,6 +115,7 @@ from bywire.core.signals import zeros as zeros
 from bywire.core.typing import Array as Array
 from bywire.core.typing import Progress as Progress
 from bywire.identification.differentiation import differentiated as differentiated
+from bywire.identification.differentiation import low_passed as low_passed
 from bywire.identification.estimate import Estimate as Estimate
 from bywire.identification.least_squares import Problem as Problem
 from bywire.identification.least_squares import estimate as estimate

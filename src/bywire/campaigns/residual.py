@@ -10,22 +10,26 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
+from bywire.core.arguments import checked
 from bywire.core.model import ASSEMBLIES
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array
 
 
+@checked
 def least_of_the_last(values: Array, rows: int) -> Array:
     """Return the minimum of the last rows, including the present one, along the last axis."""
     size = max(min(rows, values.shape[-1]), 1)
     return np.asarray(minimum_filter1d(values, size, axis=-1, origin=(size - 1) // 2))
 
 
+@checked
 def largest_of_the_last(values: Array, rows: int) -> Array:
     """Return the maximum of the last rows, including the present one, along the last axis."""
     return -least_of_the_last(-values, rows)
 
 
+@checked
 def mean_of_the_last(values: Array, rows: int) -> Array:
     """Return the mean of the last rows, including the present one, along the last axis."""
     size = max(min(rows, values.shape[-1]), 1)

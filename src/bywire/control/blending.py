@@ -9,10 +9,11 @@ from pydantic import Field
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Unit
+from bywire.core.quantities import Duration, TimeConstant, Unit
 from bywire.core.signals import Signal
 
 TorqueRate = Annotated[float, Unit("N*m/s", 5e3), Field(gt=0, allow_inf_nan=False)]
+LeastTorque = Annotated[float, Unit("N*m", 20.0), Field(ge=0, allow_inf_nan=False)]
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-2), Gt(0)]
 Torque = Annotated[float, Signal("N*m", "braking torque", 300.0)]
 Demand = Annotated[float, Signal("N*m", "demanded braking torque", 300.0), Ge(0)]
@@ -38,14 +39,19 @@ class Parameters(ParameterSet):
     """motor torque that the friction brake complements"""
     rate: TorqueRate
     """largest rate of the motor's command"""
+    T_least: LeastTorque
+    """friction demand that remains while the pedal brakes, to keep the pads on the disc"""
     t_off: Duration
-    """time in which the motor's command falls to zero while slip control acts"""
+    """time in which the motor's command falls to zero when slip control acts"""
+    t_back: TimeConstant
+    """time after slip control in which the motor does not brake"""
 
 
 class State(NamedTuple):
-    """Command of the motor."""
+    """Command of the motor, and the time until it may brake."""
 
     T_m: Torque
+    wait: Annotated[float, Signal("s", "time until the motor may brake", 0.5)]
 
 
 class Input(NamedTuple):
@@ -69,11 +75,14 @@ class Output(NamedTuple):
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
     r"""Advance the law by one sample.
 
-    .. math:: T_m = \min(T_{set}, T_{limit}), \quad T_f = \max(T_{set} - T_{seen}, 0)
+    .. math::
+        T_m = \min(T_{set} - T_{least}, T_{limit}), \quad
+        T_f = \max(T_{set} - T_{seen}, T_{least})
 
-    In category B, the set point :math:`T_{set}` is the sum of both demands. In category A, it is
-    the demand of the released accelerator, and :math:`T_f` is the pedal's demand. Corners: the
-    motor's limit, the largest rate, no friction demand, and the switch of slip control.
+    In category B, the set point :math:`T_{set}` is the sum of both demands. In category A, the
+    motor follows the demand of the released accelerator, and :math:`T_f` is the pedal's demand.
+    Corners: the motor's limit, the largest rate, the least friction demand, and the switch of slip
+    control.
 
     Notes
     -----
@@ -88,16 +97,20 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     D. Kade et al., US patent 5,511,859, 1996: friction demand from the reported motor torque.
     UN Regulation No. 13-H, section 2: electric regenerative braking systems of categories A and B.
     """
-    wanted = u.T_coast if par.category == "A" else u.T_demand + u.T_coast
+    least = ops.fmin(par.T_least, u.T_demand)
+    wanted = u.T_coast if par.category == "A" else u.T_demand + u.T_coast - least
     free = ops.clip(ops.fmin(wanted, u.limit), x.T_m - T * par.rate, x.T_m + T * par.rate)
     # Slip control takes the motor out, because it is slower to modulate than the friction brake.
     out = ops.fmax(x.T_m - T / par.t_off * ops.fmax(u.limit, x.T_m), 0.0)
-    command = ops.where(u.slip > 0.5, out, free)
+    # Slip control often acts several times in a row, and the motor does not return in between.
+    wait = ops.where(u.slip > 0.5, par.t_back, ops.fmax(x.wait - T, 0.0))
+    is_out = ops.where(u.slip > 0.5, 1.0, ops.where(wait > 0.0, 1.0, 0.0))
+    command = ops.where(is_out > 0.5, out, free)
     if par.law == "reported":
         seen = u.T_reported
     elif par.law == "commanded":
         seen = command
     else:
-        seen = ops.where(u.slip > 0.5, command, ops.fmin(wanted, u.limit_ahead))
-    friction = u.T_demand if par.category == "A" else ops.fmax(wanted - seen, 0.0)
-    return State(T_m=command), Output(T_motor=command, T_friction=friction)
+        seen = ops.where(is_out > 0.5, command, ops.fmin(wanted, u.limit_ahead))
+    friction = u.T_demand if par.category == "A" else ops.fmax(wanted + least - seen, least)
+    return State(T_m=command, wait=wait), Output(T_motor=command, T_friction=friction)

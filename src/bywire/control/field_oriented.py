@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Ge, Gt
 from pydantic import Field
@@ -15,6 +15,7 @@ from bywire.core.quantities import (
     FluxLinkage,
     Fraction,
     Inductance,
+    InternalResistance,
     PolePairs,
     Resistance,
     Unit,
@@ -27,19 +28,27 @@ LeadTicks = Annotated[float, Unit("1", 1.5), Field(ge=0, le=5, allow_inf_nan=Fal
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-4), Gt(0)]
 Amperes = Annotated[float, Signal("A", "current", 5.0)]
 Volts = Annotated[float, Signal("V", "voltage", 5.0)]
+Linkage = Annotated[float, Signal("V*s", "flux linkage", 6e-3)]
 
 
 class Parameters(ParameterSet):
     r"""The controller's model of the motor, its bandwidth, and its limits.
 
-    The gains follow from the model: :math:`k_p = L \omega_c` and :math:`k_i = R \omega_c`. With a
-    total delay of 1.5 sample times, :math:`\omega_c = 1/(3 T)` has a phase margin of 61.4 degrees.
+    ``voltage``: with ``"circle"``, the voltages are at most :math:`V_{dc}/\sqrt 3`, and sinusoidal.
+    With ``"hexagon"``, each phase can use the whole bus. The fundamental then reaches
+    :math:`2 V_{dc}/\pi` (six steps), with harmonics of the orders 5 and 7.
+
+    The gains follow from the model: :math:`k_p = L \omega_c` and :math:`k_i = (R + R_a) \omega_c`.
+    With a total delay of 1.5 sample times, :math:`\omega_c = 1/(3 T)` has a phase margin of 61.4
+    degrees.
     """
 
     omega_c: Bandwidth
     """bandwidth of the current loops"""
     p: PolePairs
     """number of pole pairs"""
+    R_a: InternalResistance
+    """active damping: resistance that the control adds; 0 for none"""
     R_hat: Resistance
     """resistance of a phase"""
     L_d_hat: Inductance
@@ -52,6 +61,8 @@ class Parameters(ParameterSet):
     """lead angle of the voltage, in sample times of rotation; 1.5 for a delay of one sample time"""
     i_max: Current
     """maximum current amplitude"""
+    voltage: Literal["circle", "hexagon"]
+    """voltages that the control uses"""
     k_fw: WeakeningGain
     """field-weakening gain; 0 disables field weakening"""
     reserve: Fraction
@@ -59,7 +70,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Integral parts, and the field-weakening current."""
+    """Integral terms, and the field-weakening current."""
 
     z_d: Annotated[float, Signal("V", "integral term, along the magnets", 1.0)]
     z_q: Annotated[float, Signal("V", "integral term, across the magnets", 1.0)]
@@ -101,23 +112,68 @@ def least_current(amplitude: Amperes, par: Parameters) -> Amperes:
     return 2.0 * a * square / (psi + ops.sqrt(psi * psi + 8.0 * a * a * square))
 
 
-def set_points(
-    i_ref: Amperes, i_fw: Amperes, i_lim: Amperes, par: Parameters
-) -> tuple[Amperes, Amperes]:
-    r"""Return the set points in rotor coordinates, limited to the maximum amplitude.
+def weakest_field(limit: Linkage, par: Parameters) -> Amperes:
+    r"""Return the current along the magnets with the maximum torque per voltage (MTPV).
 
-    The field-weakening current never cancels more than the magnet flux, :math:`i_d \ge -\psi/L_d`.
+    .. math::
+        i_d = \frac{\psi_d - \psi}{L_d}, \quad
+        \psi_d = -\frac{2 (L_q - L_d) \lambda^2}
+        {L_q \psi + \sqrt{L_q^2 \psi^2 + 8 (L_q - L_d)^2 \lambda^2}}
+
+    with the amplitude :math:`\lambda` of the flux linkage. A more negative current would reduce the
+    torque at this voltage.
+
+    References
+    ----------
+    S. Morimoto, Y. Takeda, T. Hirasa, K. Taniguchi, "Expansion of Operating Limits for Permanent
+    Magnet Motor by Current Vector Control Considering Inverter Capacity", IEEE Trans. Industry
+    Applications 26(5), 1990.
+    """
+    a, own = par.L_q_hat - par.L_d_hat, par.L_q_hat * par.psi_hat
+    square = limit * limit
+    psi_d = -2.0 * a * square / (own + ops.sqrt(own * own + 8.0 * a * a * square))
+    return (psi_d - par.psi_hat) / par.L_d_hat
+
+
+class SetPoints(NamedTuple):
+    """Set points, and the field weakening that lowers the current across the magnets."""
+
+    i_d: Amperes
+    i_q: Amperes
+    beyond: Annotated[float, Signal("A", "field weakening beyond the MTPV current", 5.0)]
+
+
+def set_points(
+    i_ref: Amperes, i_fw: Amperes, i_lim: Amperes, limit: Linkage, par: Parameters
+) -> SetPoints:
+    """Return the set points in rotor coordinates, limited to the maximum amplitude.
+
+    Field weakening lowers the current along the magnets from that with the maximum torque per
+    ampere, and the maximum amplitude limits the current across the magnets. At the current with the
+    maximum torque per voltage, the rest of the field weakening lowers the current across the
+    magnets.
+
+    Parameters
+    ----------
+    limit
+        Flux linkage that the voltage allows.
     """
     top = ops.fmin(par.i_max, i_lim)
     amplitude = ops.clip(i_ref, -top, top)
-    least = ops.fmax(-top, -par.psi_hat / par.L_d_hat)
-    i_d = ops.clip(least_current(amplitude, par) + i_fw, least, 0.0)
-    room = _root(top * top - i_d * i_d, par)
-    # Without field weakening, the amplitude equals the demanded amplitude.
-    across = _root(amplitude * amplitude - i_d * i_d, par)
-    weakened = ops.fmin(ops.fabs(amplitude), room)
-    i_q = ops.where(i_fw < 0.0, weakened, across)
-    return i_d, ops.where(amplitude < 0.0, -i_q, i_q)
+    i_0 = least_current(amplitude, par)
+    demand = _root(amplitude * amplitude - i_0 * i_0, par)
+    least = ops.fmax(-top, weakest_field(limit, par))
+    i_d = ops.clip(i_0 + i_fw, least, 0.0)
+    beyond = ops.fmin(i_0 + i_fw - least, 0.0)
+    size = ops.fmax(ops.fmin(demand, _root(top * top - i_d * i_d, par)) + beyond, 0.0)
+    return SetPoints(i_d, ops.where(amplitude < 0.0, -size, size), beyond)
+
+
+def _allowed_flux(V: Volts, omega_e: float, par: Parameters) -> Linkage:
+    """Return the flux linkage that a voltage allows at a speed; at rest, more than any current."""
+    strongest = par.psi_hat + (par.L_d_hat + par.L_q_hat) * par.i_max
+    left = ops.fmax(V - par.R_hat * par.i_max, 0.0)
+    return left / ops.fmax(ops.fabs(omega_e), V / strongest)
 
 
 def _root(square: float, par: Parameters) -> float:
@@ -126,62 +182,120 @@ def _root(square: float, par: Parameters) -> float:
     return ops.where(square > least, ops.sqrt(ops.fmax(square, least)), 0.0 * par.i_max)
 
 
-def _relief(v_d: Volts, v_q: Volts, omega_e: float, size: Volts, par: Parameters) -> float:
-    """Return how much a current against the magnets reduces the voltage, from -1 to 1."""
-    X = omega_e * par.L_d_hat
-    slope = par.R_hat * v_d + X * v_q
-    return slope / (ops.sqrt(par.R_hat * par.R_hat + X * X) * size)
+def _relief(
+    v: tuple[Volts, Volts],
+    size: Volts,
+    omega_e: float,
+    i: tuple[Amperes, Amperes],
+    beyond: Amperes,
+    par: Parameters,
+) -> float:
+    """Return the cosine of the angle between the voltage and its change by less field weakening.
+
+    The currents change along the curve of constant torque, or beyond the MTPV current across the
+    magnets.
+    """
+    a = par.L_d_hat - par.L_q_hat
+    only_q = beyond < 0.0
+    torque = ops.where(i[1] < 0.0, -par.psi_hat, par.psi_hat)
+    by_d = ops.where(only_q, 0.0 * par.psi_hat, par.psi_hat + a * i[0])
+    by_q = ops.where(only_q, torque, -a * i[1])
+    to_d = par.R_hat * by_d - omega_e * par.L_q_hat * by_q
+    to_q = par.R_hat * by_q + omega_e * par.L_d_hat * by_d
+    least = 1e-6 * par.R_hat * par.psi_hat
+    length = ops.sqrt(to_d * to_d + to_q * to_q + least * least)
+    return (to_d * v[0] + to_q * v[1]) / (length * size)
+
+
+def hexagon(v_alpha: Volts, v_beta: Volts, V_dc: Volts) -> tuple[Volts, Volts]:
+    r"""Return the voltages of a modulator whose duties are limited to 0 to 1.
+
+    The modulator adds the voltage to all phases that centers them, and limits each phase to
+    :math:`\pm V_{dc}/2`. Voltages within the hexagon do not change. A large demand results in six
+    steps, whose fundamental has the amplitude :math:`2 V_{dc}/\pi`.
+
+    References
+    ----------
+    D. G. Holmes, T. A. Lipo, Pulse Width Modulation for Power Converters, 2003, chapter 8.
+    """
+    half, side = -0.5 * v_alpha, 0.5 * math.sqrt(3.0) * v_beta
+    phases = v_alpha, half + side, half - side
+    highest = ops.fmax(phases[0], ops.fmax(phases[1], phases[2]))
+    lowest = ops.fmin(phases[0], ops.fmin(phases[1], phases[2]))
+    center, most = 0.5 * (highest + lowest), 0.5 * V_dc
+    a, b, d = (ops.clip(v - center, -most, most) for v in phases)
+    return (2.0 * a - b - d) / 3.0, (b - d) / math.sqrt(3.0)
 
 
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
     r"""Advance the controller by one sample.
 
     .. math::
-        v_d = k_p e_d + z_d - \omega_e L_q i_q, \quad
-        v_q = k_p e_q + z_q + \omega_e (L_d i_d + \psi)
+        v_d = k_p e_d + z_d - R_a i_d - \omega_e L_q i_q, \quad
+        v_q = k_p e_q + z_q - R_a i_q + \omega_e (L_d i_d + \psi)
 
-    A voltage above :math:`V_{dc}/\sqrt 3` is limited in magnitude and keeps its direction. The
-    integral terms follow the limited voltage. The voltage then gets a lead angle: the rotation of
-    the rotor until the middle of the sample in which the inverter applies the voltage.
+    A voltage above the limit keeps its direction. The integral terms follow the limited voltage.
+    The voltage then gets a lead angle: the rotation of the rotor until the middle of the sample in
+    which the inverter applies the voltage.
 
-    Field weakening integrates the voltage above the reserve, weighted by how much a current against
-    the magnets reduces it,
+    Field weakening integrates the voltage above the reserve, weighted by the cosine of the angle
+    between the voltage and the change of the voltage along a curve of constant torque. For surface
+    magnets, the weight is
 
     .. math::
         \frac{R v_d + \omega_e L_d v_q}{\sqrt{R^2 + \omega_e^2 L_d^2}\, |v|}
 
     Notes
     -----
-    Without this weight, a slow motor whose resistance needs the whole voltage would weaken its
-    field completely. No current would then remain for the torque.
+    Without active damping, the zero of the control cancels the winding's pole L/R. Set points are
+    then followed without this pole, but a disturbance such as an error of the flux linkage decays
+    with it. A resistance :math:`R_a` moves the pole of the damped winding to
+    :math:`(R + R_a) / L`.
+
+    Without the weight of field weakening, a slow motor whose resistance needs the whole voltage
+    would weaken its field completely. No current would then remain for the torque. Where
+    :math:`\psi / L_d` is less than the maximum amplitude, the circle of that amplitude is not the
+    optimum at high speed.
     """
     omega_e = par.p * u.omega
     c, s = ops.cos(u.theta_e), ops.sin(u.theta_e)
     i_d, i_q = c * u.i_alpha + s * u.i_beta, c * u.i_beta - s * u.i_alpha
-    i_d_ref, i_q_ref = set_points(u.i_ref, x.i_fw, u.i_lim, par)
-    e_d, e_q = i_d_ref - i_d, i_q_ref - i_q
-    v_d = par.L_d_hat * par.omega_c * e_d + x.z_d - omega_e * par.L_q_hat * i_q
-    v_q = par.L_q_hat * par.omega_c * e_q + x.z_q + omega_e * (par.L_d_hat * i_d + par.psi_hat)
-    v_max = u.V_dc / math.sqrt(3.0)
+    most, usual = _voltages(u.V_dc, par)
+    reserved = par.reserve * usual
+    ref = set_points(u.i_ref, x.i_fw, u.i_lim, _allowed_flux(reserved, omega_e, par), par)
+    e_d, e_q = ref.i_d - i_d, ref.i_q - i_q
+    damped_d, damped_q = x.z_d - par.R_a * i_d, x.z_q - par.R_a * i_q
+    v_d = par.L_d_hat * par.omega_c * e_d + damped_d - omega_e * par.L_q_hat * i_q
+    v_q = par.L_q_hat * par.omega_c * e_q + damped_q + omega_e * (par.L_d_hat * i_d + par.psi_hat)
     size = ops.sqrt(v_d * v_d + v_q * v_q)
-    is_limited = size > v_max
-    divisor = ops.fmax(size, v_max)  # a voltage of zero has no direction
-    share = v_max / divisor
-    k_i = par.R_hat * par.omega_c
-    excess = size - par.reserve * v_max
-    relief = _relief(v_d, v_q, omega_e, divisor, par)
-    weakened = ops.where(excess > 0.0, excess * relief, excess)
-    state = State(
-        z_d=x.z_d + T * (k_i * e_d + (share - 1.0) * v_d * par.omega_c),
-        z_q=x.z_q + T * (k_i * e_q + (share - 1.0) * v_q * par.omega_c),
-        i_fw=ops.clip(x.i_fw - T * par.k_fw * weakened, -par.i_max, 0.0),
-    )
+    share = most / ops.fmax(size, most)  # a voltage of zero has no direction
+    within_d, within_q = share * v_d, share * v_q
     ahead = u.theta_e + par.lead * omega_e * T
     c, s = ops.cos(ahead), ops.sin(ahead)
-    return state, Output(
-        v_alpha=share * (c * v_d - s * v_q),
-        v_beta=share * (s * v_d + c * v_q),
-        i_d_ref=i_d_ref,
-        i_q_ref=i_q_ref,
-        limited=ops.where(is_limited, 1.0, 0.0),
+    v_alpha, v_beta = c * within_d - s * within_q, s * within_d + c * within_q
+    if par.voltage == "hexagon":
+        v_alpha, v_beta = hexagon(v_alpha, v_beta, u.V_dc)
+        within_d, within_q = c * v_alpha + s * v_beta, c * v_beta - s * v_alpha
+    k_i = (par.R_hat + par.R_a) * par.omega_c
+    excess = size - reserved
+    relief = _relief((v_d, v_q), ops.fmax(size, reserved), omega_e, (i_d, i_q), ref.beyond, par)
+    weakened = ops.where(excess > 0.0, excess * relief, excess)
+    state = State(
+        z_d=x.z_d + T * (k_i * e_d + (within_d - v_d) * par.omega_c),
+        z_q=x.z_q + T * (k_i * e_q + (within_q - v_q) * par.omega_c),
+        i_fw=ops.clip(x.i_fw - T * par.k_fw * weakened, -2.0 * par.i_max, 0.0),
     )
+    return state, Output(
+        v_alpha=v_alpha,
+        v_beta=v_beta,
+        i_d_ref=ref.i_d,
+        i_q_ref=ref.i_q,
+        limited=ops.where(size > usual, 1.0, 0.0),
+    )
+
+
+def _voltages(V_dc: Volts, par: Parameters) -> tuple[Volts, Volts]:
+    """Return the maximum demand, and the maximum fundamental."""
+    if par.voltage == "hexagon":
+        return V_dc, 2.0 / math.pi * V_dc
+    return V_dc / math.sqrt(3.0), V_dc / math.sqrt(3.0)

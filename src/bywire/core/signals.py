@@ -239,6 +239,7 @@ def merged_signals(
     return [(name, signal, tuple(where)) for (name, signal), where in places.items()]
 
 
+@checked
 def joined(module: str, name: str, *tuples: type[Any]) -> Any:
     """Join signal tuples into a single tuple that the module exports under this name.
 

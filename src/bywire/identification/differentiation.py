@@ -19,6 +19,7 @@ _REACH = 3
 _HOLD = np.array([-1.0, 13.0, 13.0, -1.0]) / 24.0
 
 
+@checked
 def low_passed(values: Array, interval: float, cutoff: float) -> Array:
     """Low-pass signals without delay.
 

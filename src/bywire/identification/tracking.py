@@ -101,7 +101,7 @@ def _find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
     relations = [r for r in relations if r.parameter in par.flat()]
     if not relations:
         raise ParameterError(
-            f"{name} is not a parameter of this brake. Use a brake that has it", name=name
+            f"{name} is not a parameter of this brake. Use a brake with this parameter", name=name
         )
     for relation in relations:
         if all(signal in data for signal in relation.signals):

@@ -83,13 +83,17 @@ def output(u: Input, par: Parameters, gas: air.Parameters) -> Output:
     p_1, p_2 = ops.fmax(u.p_a, u.p_b), ops.fmin(u.p_a, u.p_b)
     T_1 = ops.where(forward, u.T_a, u.T_b)
     r = p_2 / p_1
-    share = (ops.clip(r, par.b, par.r_lam) - par.b) / (1.0 - par.b)
-    psi = ops.sqrt(1.0 - share * share)
-    psi = psi * ops.where(r > par.r_lam, (1.0 - r) / (1.0 - par.r_lam), 1.0)
-    sign = ops.where(forward, 1.0, -1.0)
-    size = u.opening * par.C * gas.rho_0 * p_1 * ops.sqrt(gas.T_0 / T_1) * psi
-    mdot = sign * size
+    # The laminar flow uses the pressure difference, which has no corner at equal pressures.
+    turbulent = ops.where(forward, 1.0, -1.0) * p_1 * _flow_function(ops.fmin(r, par.r_lam), par)
+    laminar = (u.p_a - u.p_b) * _flow_function(par.r_lam, par) / (1.0 - par.r_lam)
+    across = ops.where(r > par.r_lam, laminar, turbulent)
+    mdot = u.opening * par.C * gas.rho_0 * ops.sqrt(gas.T_0 / T_1) * across
     return Output(mdot=mdot, H=mdot * gas.gamma * air.heat_capacity(gas) * T_1)
+
+
+def _flow_function(r: float, par: Parameters) -> float:
+    share = (ops.fmax(r, par.b) - par.b) / (1.0 - par.b)
+    return ops.sqrt(1.0 - share * share)
 
 
 def power_loss(u: Input, par: Parameters, gas: air.Parameters) -> Loss:

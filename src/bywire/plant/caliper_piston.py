@@ -16,6 +16,8 @@ from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Area, Conductance, Damping, Mass, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
+from bywire.core.typing import Array
+from bywire.core.validity import row_by_row
 from bywire.plant import brake_fluid
 
 FluidVolume = Annotated[float, Unit("m**3", 1e-5), Field(gt=0, allow_inf_nan=False)]
@@ -123,3 +125,9 @@ def power_loss(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Loss
     """Return the heat from damping, and the power that leaves with the leak, >= 0."""
     leak = brake_fluid.convected_power(par.G_leak * x.p, x.p, fluid)
     return par.d * x.v * x.v + leak
+
+
+@row_by_row
+def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
+    """Warn if the absolute pressure is below zero."""
+    return brake_fluid.watch(t, x.p, fluid, "in the caliper")

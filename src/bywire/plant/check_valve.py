@@ -25,7 +25,12 @@ class Parameters(ParameterSet):
     """pressure drop at which the valve opens"""
 
 
-FAULTS = (ParameterFault("clogged", "narrower seat", ("seat.d",), 0.5),)
+FAULTS = (
+    ParameterFault("clogged", "narrower seat", ("seat.d",), 0.5),
+    ParameterFault(
+        "stuck", "closed ball (value: cracking pressure)", replaced="p_crack", value=5e7
+    ),
+)
 
 
 class Input(NamedTuple):

@@ -120,8 +120,9 @@ def diodes(u: Input, par: Parameters) -> tuple[Volts, Volts, Loss]:
     Notes
     -----
     Ideal diodes are set-valued: without current, the voltage between two phases can have any value
-    between :math:`\pm V_{dc}`. Here a current below :math:`i_{off}` flows instead. Its slope needs
-    :math:`i_{off} > V_{dc} h / L`, with the step h, otherwise the currents oscillate around zero.
+    between :math:`\pm V_{dc}`. Here a current below :math:`i_{off}` flows instead, with kinks at
+    :math:`\pm i_{off}`. If :math:`i_{off} < \tfrac{1}{4} V_{dc} h / L`, with the step h, the
+    currents oscillate around zero.
     """
     v_alpha, v_beta, power = _opposing(u, 0.5 * u.V_dc + par.V_f, par.i_off)
     return v_alpha, v_beta, power * (par.V_f / (0.5 * u.V_dc + par.V_f))

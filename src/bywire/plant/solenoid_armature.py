@@ -37,6 +37,8 @@ SpringRate = Annotated[float, Unit("N/m", 1e3), Field(ge=0, allow_inf_nan=False)
 Preload = Annotated[float, Unit("N", 3.0), Field(gt=0, allow_inf_nan=False)]
 ArmatureFriction = Annotated[float, Unit("N", 0.2), Field(ge=0, allow_inf_nan=False)]
 ArmatureDamping = Annotated[float, Unit("N*s/m", 1.0), Field(ge=0, allow_inf_nan=False)]
+Current = Annotated[float, Signal("A", "current of the coil", 2.0)]
+MagneticForce = Annotated[float, Signal("N", "magnetic force", 5.0)]
 CopperLoss = Annotated[float, Signal("W", "copper loss of the coil", role=Role("sink", "coil"))]
 DampingLoss = Annotated[
     float, Signal("W", "damping loss of the armature", role=Role("sink", "armature"))
@@ -134,8 +136,8 @@ class Input(NamedTuple):
 class Output(NamedTuple):
     """Current, magnetic force, flow and opened fraction."""
 
-    i: Annotated[float, Signal("A", "current of the coil", 2.0)]
-    F_m: Annotated[float, Signal("N", "magnetic force", 5.0)]
+    i: Current
+    F_m: MagneticForce
     q: orifice.Flow
     opening: orifice.Opening
 
@@ -158,6 +160,12 @@ def travel_ends(par: Parameters) -> Ends:
 def inductance(x: State, par: Parameters) -> Annotated[float, Signal("H", "inductance", 1e-3)]:
     r"""Return the inductance, :math:`L(x) = L_0 + 2 k_m/(g_0 - x)`."""
     return par.L_0 + 2.0 * par.k_m / (par.g_0 - x.x)
+
+
+def magnetic_force(i: Current, x: State, par: Parameters) -> MagneticForce:
+    r"""Return the magnetic force of a current, :math:`F_m = k_m i^2/(g_0 - x)^2`."""
+    gap = par.g_0 - x.x
+    return par.k_m * i * i / (gap * gap)
 
 
 def friction(par: Parameters) -> Annotated[float, Signal("N", "dry friction", 0.2)]:
@@ -193,11 +201,11 @@ def output(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -
     work of the pressures on the needle. The opening has kinks at the seat and where the conical gap
     is as large as the orifice.
     """
-    i, gap = x.psi / inductance(x, par), par.g_0 - x.x
+    i = x.psi / inductance(x, par)
     u_orifice = _through(x, u, par)
     return Output(
         i=i,
-        F_m=par.k_m * i * i / (gap * gap),
+        F_m=magnetic_force(i, x, par),
         q=orifice.flow(u_orifice, par.seat, fluid) + _pressed(x, u, par) * x.v,
         opening=u_orifice.opening,
     )
@@ -257,6 +265,9 @@ def throttling(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameter
 
 @row_by_row
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
-    """Warn if the armature reaches the iron, because its stop is too soft."""
-    closed = x.x >= par.g_0
-    return first(t, closed, "the armature closes its air gap", ": use a stiffer end stop")
+    """Warn if seat or stop are missing or too soft."""
+    after = ". Connect an end_stop from travel_ends.near to .far, or make it stiffer"
+    return [
+        *first(t, x.x <= -0.5 * par.travel, "the armature leaves its near end", after),
+        *first(t, x.x >= par.g_0, "the armature closes its air gap", after),
+    ]

@@ -46,7 +46,7 @@ FIGURES = Figures(
     largest_dip=(
         "%",
         f"Largest lack of braking torque relative to the demand, from {_CALM:g} s after its ramp, "
-        "at speeds above 1 km/h.",
+        "at speeds above 1 km/h, while slip control does not act.",
     ),
     steady_error=(
         "%",
@@ -96,10 +96,14 @@ class Blended:
         Recorded energies whose sum is the kinetic energy.
     brake
         Recorded energy that the friction brake takes from the wheel.
-    v, slip
-        Recorded speed and slip.
+    v, place, slip
+        Recorded speed, distance and slip.
+    acts
+        Recorded activity of slip control; empty if there is none.
     demand
-        Stimulus for the pedal, in N m or with ``scale(par)`` in its unit per N m.
+        Stimulus of the pedal.
+    unit
+        ``unit(par)``: value of this stimulus per N m.
     road
         Place of the road's parameters.
     radius
@@ -116,7 +120,9 @@ class Blended:
     v: str = "v_x"
     place: str = "s"
     slip: str = "slip"
+    acts: str = ""
     demand: str = "T_demand"
+    unit: Callable[[Any], float] = lambda par: 1.0
     road: str = "corner.road"
     radius: str = "corner.r"
     changes: Mapping[str, Any] = field(default_factory=dict)
@@ -145,12 +151,14 @@ def blended_stop(name: str, vehicle: Blended, defaults: Mapping[str, Any]) -> Ex
         )
         changed = par.replace({**vehicle.changes, **laid(vehicle.road, options.surface), **slope})
 
+        per_torque = vehicle.unit(changed)
+
         def start(par: Any) -> tuple[Any, Any]:
             return vehicle.start(options.v_0, par, options.soc)
 
         def stimulus(t: Array) -> dict[str, Array]:
             coast = np.full_like(t, options.T_coast)
-            return {vehicle.demand: demanded(t, options), "T_coast": coast}
+            return {vehicle.demand: per_torque * demanded(t, options), "T_coast": coast}
 
         return (
             Case(
@@ -230,8 +238,10 @@ def _deviations(
     whole = options.T_demand + options.T_coast
     lack = demanded(t, options) + options.T_coast - motor - run[vehicle.friction].values
     judged = (t >= options.t_ramp + _CALM) & (t <= end) & (v > _SLOW)
+    if vehicle.acts:
+        judged &= run[vehicle.acts].values < 0.5
     if not judged.any():
-        short = (math.nan, "the vehicle stops while the demand builds up")
+        short = (math.nan, "the demand builds up, or slip control acts, until the stop")
         return {"largest_dip": short, "steady_error": short}
     half = max(round(_CALM / float(np.median(np.diff(t)))), 1)
     around = sliding_window_view(np.pad(motor, half, mode="edge"), 2 * half + 1)

@@ -71,6 +71,7 @@ class Law(NamedTuple):
     T_limit: Annotated[float, Signal("N*m", "limit of the motor torque", 300.0)]
     T_friction: Annotated[float, Signal("N*m", "demand that is sent to the brake", 300.0)]
     T_brake: Annotated[float, Signal("N*m", "demand that arrives at the brake", 300.0)]
+    t_wait: Annotated[float, Signal("s", "time until the motor may brake after slip control", 0.5)]
     a_m_hat: Annotated[float, Signal("m/s**2", "deceleration seen by the blending law", 5.0)]
     v_m_last: Annotated[float, Signal("m/s", "wheel speed at the last tick of blending", 20.0)]
 
@@ -88,8 +89,10 @@ Memory: Any = joined(__name__, "Memory", Law, _SENT, _REPORT)
 
 
 CHANNELS = (
-    Channel("motor", "command of the motor", "N*m", "T_m_ref", "drive", task="blending"),
-    Channel("motor_torque", "motor torque that the motor reports", "N*m", "T_m", offset=10.0),
+    Channel(
+        "wheel_motor", "command of the wheel motor", "N*m", "T_m_ref", "drive", task="blending"
+    ),
+    Channel("motor_report", "torque that the wheel motor reports", "N*m", "T_m", offset=10.0),
     Channel("brake_demand", "demand on the friction brake", "N*m", "T_brake", "drive"),
 )
 """signals that faults can corrupt, for the `Channels` of a vehicle with regeneration"""
@@ -120,10 +123,11 @@ def tick(seen: Readings, m: Any, par: Parameters) -> Any:
     now, then = (wheel_motor.limit(each / seen.r, each, P_bat, par.motor) for each in (v, ahead))
     m, reported = _transmitted("report", seen.T_m, m, par)
     u = blending.Input(seen.T_demand, seen.T_coast, now, then, reported, seen.slip_acts)
-    state, out = blending.output(blending.State(m.T_m_ref), u, T, par.blending)
+    state, out = blending.output(blending.State(m.T_m_ref, m.t_wait), u, T, par.blending)
     m, received = _transmitted("sent", out.T_friction, m, par)
     return m._replace(
         T_m_ref=state.T_m,
+        t_wait=state.wait,
         T_limit=now,
         T_friction=out.T_friction,
         T_brake=received,
@@ -175,8 +179,11 @@ class Regenerating(Assembly[ParT, MemoryT]):
         """Return whether slip control acts, above 0.5; by default, there is no slip control."""
         return 0.0
 
-    def demands(self, u: Any, par: ParT) -> tuple[float, float]:
-        """Return the torques that pedal and released accelerator demand [N m]."""
+    def demands(self, m: Any, u: Any, par: ParT) -> tuple[float, float]:
+        """Return the torques that pedal and released accelerator demand [N m].
+
+        If there is slip control, the first one is the pedal's demand after slip control.
+        """
         return u.T_demand, u.T_coast
 
     def motor_wheel(self, x: Any, par: ParT) -> tuple[float, float]:
@@ -206,7 +213,7 @@ class Regenerating(Assembly[ParT, MemoryT]):
 
     def _blended(self, x: Any, m: Any, u: Any, par: Any) -> Any:
         omega, r = self.motor_wheel(x, par)
-        seen = Readings(*self.demands(u, par), x.T_m, omega, r, x.soc, self.slip_acts(m))
+        seen = Readings(*self.demands(m, u, par), x.T_m, omega, r, x.soc, self.slip_acts(m))
         return tick(seen, m, par.regeneration)
 
 

@@ -24,6 +24,7 @@ MODELS = {
     "two-wheeler-by-wire": None,
     "wedge-brake": None,
     "wedge-corner": None,
+    "wedge-corner-electric": None,
     "wheel-on-drum": None,
     "two-wheeler-whole-rear": None,
     "hydraulic-brake": EXAMPLES / "hydraulic_brake.py",

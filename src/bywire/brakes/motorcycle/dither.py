@@ -59,9 +59,9 @@ def admissible_frequencies(par: Par, low: float, high: float, count: int) -> lis
     inside = [f for f in frequencies if low * (1 - 1e-9) <= f <= high * (1 + 1e-9)]
     if not inside:
         raise ParameterError(
-            f"no dither frequency from {low:g} to {high:g} Hz has a period of an even number of "
-            f"sample times, {T * 1e3:g} ms. Widen the range (f_min, f_max), or sample faster "
-            "(ecu.T_s)",
+            f"no dither frequency from {low:g} to {high:g} Hz has a period equal to an even number "
+            f"of sample times ({T * 1e3:g} ms each). Widen the range (f_min, f_max), or sample "
+            "faster (ecu.T_s)",
             name="f_min",
             value=f"{low:g}",
         )

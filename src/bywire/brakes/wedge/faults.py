@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.rigs.electric_corner import ElectricCorner
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner
 from bywire.core.faults import Channel, Channels, Fault
+from bywire.vehicle import regeneration
 
 _SIGNALS = (
     Channel("moment", "moment sensor", "N*m", "y_M", offset=50.0),
@@ -22,6 +24,7 @@ _NOTHING = 1e-6  # fraction of a torque constant, which must stay positive
 
 BRAKE_CHANNELS = Channels(WedgeBrake.name, _SIGNALS)
 CORNER_CHANNELS = Channels(WedgeCorner.name, _SIGNALS)
+ELECTRIC_CHANNELS = Channels(ElectricCorner.name, (*_SIGNALS, *regeneration.CHANNELS))
 
 
 def _jammed(motor: str) -> Any:

@@ -68,6 +68,23 @@ CORNER = Panels(
 )
 """vehicle at the top, brake below"""
 
+ELECTRIC = Panels(
+    "wedge-corner-electric",
+    ("wedge-corner-electric",),
+    (
+        CORNER.panels[0],
+        Panel(
+            "braking torque",
+            (Trace("T_m"), Trace("M_B", Role.SECOND), Trace("T_limit", Role.LIMIT)),
+            height=1.8,
+        ),
+        CORNER.panels[1],
+        Panel("charge", (Trace("soc"),)),
+        *CORNER.panels[2:],
+    ),
+)
+"""as the corner, with the torques of motor and brake"""
+
 DRIVES = Panels(
     "wedge-drives",
     ("wedge-brake", "screw-rig", "shaft-rig"),

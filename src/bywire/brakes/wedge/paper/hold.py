@@ -55,14 +55,15 @@ def _power_off(runs: Runs) -> list[Item]:
             "hold.neutral",
             FACTS["remains"],
             _share(kept),
-            note="moment 2 s after power-off, in % of the moment before. Runout off, friction on",
+            note="moment 2 s after power-off, in % of the moment before power-off, without "
+            "runout and with friction",
         ),
         compared(
             "hold.drift",
             still,
             usual["drift"],
             "<=",
-            "change in wedge travel in the 2 s after all bodies stick, runout on",
+            "change in wedge travel in the 2 s after all bodies stick, with runout",
         ),
         found(
             "hold.relaxation",

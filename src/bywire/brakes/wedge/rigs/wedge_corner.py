@@ -121,8 +121,13 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
             return brake
         return (Task("slip", par.ecu.T_s, _slip), *brake)
 
+    def demand(self, m: Any, u: control.Stimulus, par: Any) -> float:
+        """Return the moment that the brake follows [N m]."""
+        moment: float = u.M_set if par.ecu.abs == "off" else m.M_left
+        return moment
+
     def _moment(self, x: Any, m: Any, u: control.Stimulus, par: Any) -> Any:
-        left = u if par.ecu.abs == "off" else u._replace(M_set=m.M_left)
+        left = u._replace(M_set=self.demand(m, u, par))
         return super()._moment(x, _contact_tracked(x, m, par), left, par)
 
     def remarks(self, recording: Any, par: Any) -> list[str]:

@@ -1,0 +1,1 @@
+"""Variants of the brake, one file each."""
