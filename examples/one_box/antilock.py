@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from bywire.authoring import Signal, signals
+from bywire.core import ops
 from bywire.plant import solenoid_valve
 from bywire.vehicle import slip_control
 from one_box import ecu
@@ -46,6 +47,7 @@ Memory: Any = signals.joined(__name__, "Memory", ecu.Memory, ValveMemory, slip_c
 def tick(m: Any, p: float, par: Any) -> Any:
     """Run the control of the valves once after slip control; ``p``: plunger pressure [Pa]."""
     p_ref = m.M_left / par.antilock.slip.k_hat
+    p = ops.where(m.refill > 0.5, ops.fmax(p, m.p_kept), p)  # behind the separation valve
     state, out = valve_pressure.output(
         valve_pressure.State(m.p_hat, m.building, m.dumping, m.switched, m.V_hat),
         valve_pressure.Input(p_ref, p, m.abs),

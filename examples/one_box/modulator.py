@@ -36,7 +36,11 @@ MemoryT = TypeVar("MemoryT")
 
 
 class Modulator(Hydraulics[ParT, MemoryT]):
+<<<<<<< HEAD
     """The brake whose wheel pressure can be lowered. The pump returns the fluid to the plunger.
+=======
+    """The brake whose wheel pressure can be lowered. The pump returns the fluid to the circuit."""
+>>>>>>> w-onebox
 
     The set-valued load of the pump is a second dry friction.
     """
@@ -57,7 +61,7 @@ class Modulator(Hydraulics[ParT, MemoryT]):
 
     def wire(self, w: Any) -> None:
         """Connect the valves, accumulator and pump, then the rest of the brake."""
-        fluid, p = w.par.fluid, w.chamber.x.p
+        fluid, p = w.par.fluid, w.others.x.p
         w.closed = w.m.close_on
         w.p_acc = accumulator.pressure(w.store.x, w.store.par, fluid)
         w.outlet.u = solenoid_valve.Input(w.m.release_on, w.caliper.x.p, w.p_acc)

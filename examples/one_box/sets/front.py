@@ -82,17 +82,10 @@ NUMBERS = {
     "port.law": chosen("dead-stroke", "the plunger has no port after the first millimeter"),
     "port.x_port": chosen(1 * MM, "usual free travel"),
     "port.G_port": chosen(5e-10, "0.5 bar at 50 mm/s"),
-    "makeup.seat.d": chosen(3 * MM, "lip of the cup seal"),
-    "makeup.seat.C_d": chosen(0.65, "sharp edge"),
-    "makeup.seat.Re_cr": chosen(
-        2000.0, "laminar gap under the lip; also not too stiff for the step"
-    ),
-    "makeup.p_crack": chosen(0.05 * BAR, "soft lip"),
     "stop.k_stop": chosen(5e7, "steel on steel"),
     "stop.tau_stop": chosen(2e-4, "no rebound"),
-    "line.d": chosen(1.2 * MM, "open inlet valves of three wheels together"),
-    "line.C_d": chosen(0.65, "sharp edge"),
-    "line.Re_cr": chosen(500.0, "not too stiff for the step: 0.3 bar"),
+    **_valve("separation", 1.2 * MM, 0.43 * MM, "open"),
+    "separation.seat.Re_cr": chosen(500.0, "not too stiff for the step: 0.3 bar"),
     "others.V_1": chosen(0.63 * CM3, "a second front brake and two rear brakes of 40 % each"),
     "others.p_1": chosen(4 * BAR, "same as the wheel"),
     "others.c": chosen(0.0198 * CM3 / BAR, "a second front brake and two rear brakes of 40 % each"),
@@ -126,6 +119,13 @@ NUMBERS = {
     "ecu.pressure.brakes.V_1": derived(lambda par: par.caliper.V_1 + par.others.V_1, _ASSUMED),
     "ecu.pressure.brakes.p_1": derived(lambda par: par.caliper.p_1, _ASSUMED),
     "ecu.pressure.brakes.c": derived(lambda par: par.caliper.c + par.others.c, _ASSUMED),
+    "ecu.refill.theta_begin": derived(
+        lambda par: 0.9 * par.plunger.x_end / par.gear.k_g, "nine tenths of the travel"
+    ),
+    "ecu.refill.theta_end": derived(
+        lambda par: (par.plunger.x_rest + 1.0 * MM) / par.gear.k_g, "1 mm from the stop"
+    ),
+    "ecu.refill.omega": chosen(40.0, "17 ml/s, of which a leak takes a part"),
     "ecu.position.f_n": chosen(30.0, "three times the pressure loop"),
     "ecu.position.zeta": chosen(1.0, "no overshoot"),
     "ecu.position.c": chosen(1.0, "the speed of the reference is known"),
