@@ -263,17 +263,11 @@ def _saturated_map() -> dict[str, Any]:
     }
 
 
-VALUES: dict[str, dict[str, Any]] = {
-    "caliper_piston": {
-        "A_pd": 1.96e-3,
-        "V_0": 1e-5,
-        "m": 0.3,
-        "d": 1e3,
-        "G_leak": 0.0,
-    },  # of elements that no parameter set contains or uses
+VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set contains or uses
     "adhesion": {"curve": "burckhardt"},
     "backlash": {"i": 1.0, "b": 10e-3, "k": 300.0, "tau": 1e-4},
     "ball_ramp": {"r": 20 * MM, "alpha": 3 * DEG, "mu": 0.0},
+    "caliper_piston": {"A_pd": 1.96e-3, "V_0": 1e-5, "m": 0.3, "d": 1e3, "G_leak": 0.0},
     "cup_seal": {
         "F_pr": 10.0,
         "f_p": 1e-5,
@@ -337,6 +331,7 @@ VALUES: dict[str, dict[str, Any]] = {
         "G": 60 * BAR,
     },
     "rack": {"r_p": 15 * MM, "eta": 0.9},
+    "seal_rollback": {"k": 6e5, "z_max": 0.3 * MM},
     "solenoid_armature": {
         **_SEAT,
         "unpowered": "closed",
@@ -361,7 +356,6 @@ VALUES: dict[str, dict[str, Any]] = {
         "F_s2": 60.0,
         "k_s2": 4e3,
     },
-    "seal_rollback": {"k": 6e5, "z_max": 0.3 * MM},
 }
 
 

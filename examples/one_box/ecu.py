@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from annotated_types import Ge
+
 from bywire.authoring import Limited, Signal
 from bywire.control import current_pi, pedal_map, position_pd
 from bywire.core import ops
@@ -14,8 +16,8 @@ from one_box.laws import plunger_pressure, refill
 class Stimulus(NamedTuple):
     """External inputs. ``drive`` determines which of the demands acts."""
 
-    F_foot: Annotated[float, Signal("N", "foot force", 100.0)]
-    p_set: Annotated[float, Signal("Pa", "pressure demand", 5e6)]
+    F_foot: Annotated[float, Signal("N", "foot force", 100.0), Ge(0)]
+    p_set: Annotated[float, Signal("Pa", "pressure demand", 5e6), Ge(0)]
     theta_set: Annotated[float, Signal("rad", "motor angle demand", 10.0)]
     i_set: Annotated[float, Signal("A", "current demand", 20.0)]
 

@@ -36,11 +36,7 @@ MemoryT = TypeVar("MemoryT")
 
 
 class Modulator(Hydraulics[ParT, MemoryT]):
-<<<<<<< HEAD
-    """The brake whose wheel pressure can be lowered. The pump returns the fluid to the plunger.
-=======
-    """The brake whose wheel pressure can be lowered. The pump returns the fluid to the circuit."""
->>>>>>> w-onebox
+    """The brake whose wheel pressure can be lowered. The pump returns the fluid to the circuit.
 
     The set-valued load of the pump is a second dry friction.
     """

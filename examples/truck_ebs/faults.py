@@ -11,10 +11,14 @@ def _reading(value: float, par: Any) -> float:
     return value / float(par.ecu.p_range)
 
 
-CHANNELS = Channels(
-    "truck-ebs",
-    (
-        Channel("pressure", "pressure sensor", "Pa", "y_p", seen=_reading, stuck=0.0, offset=0.5e5),
-        Channel("pilot", "pilot valve", "Pa", "p_control", "drive", stuck=0.0, task="ecu"),
-    ),
+_CHANNELS = (
+    Channel("pressure", "pressure sensor", "Pa", "y_p", seen=_reading, stuck=0.0, offset=0.5e5),
+    Channel("pilot", "pilot valve", "Pa", "p_control", "drive", stuck=0.0, task="ecu"),
 )
+_MODULATOR = (
+    Channel("hold_valve", "hold valve", "1", "close", "drive", stuck=1.0, task="slip"),
+    Channel("vent_valve", "vent valve", "1", "vents", "drive", stuck=1.0, task="slip"),
+)
+CHANNELS = Channels("truck-ebs", _CHANNELS)
+ABS_CHANNELS = Channels("truck-abs", (*_CHANNELS, *_MODULATOR))
+PARK_CHANNELS = Channels("truck-park", _CHANNELS)

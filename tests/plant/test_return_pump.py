@@ -282,8 +282,8 @@ def test_pressures_outside_their_range_are_reported():
     text = "the return pump works against 260 bar, above p_max = 250 bar"
     assert return_pump.watch(t, u, par.pump, par.fluid) == [text]
     u = return_pump.Input(rest, rest, np.array([0.0, -1.1e5]), rest)
-    text = "the absolute pressure at the pump's suction is below zero at t = 1 s"
-    assert return_pump.watch(t, u, par.pump, par.fluid) == [text]
+    (text,) = return_pump.watch(t, u, par.pump, par.fluid)
+    assert text.startswith("the absolute pressure at the pump's suction is below zero at t = 1 s")
     assert return_pump.watch(t, u._replace(p_s=rest), par.pump, par.fluid) == []
 
 

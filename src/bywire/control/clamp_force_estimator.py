@@ -62,6 +62,7 @@ ContactAngle = Annotated[float, Unit("rad", 10.0), Field(allow_inf_nan=False)]
 TorquePerForce = Annotated[float, Unit("N*m/N", 1e-5), Field(ge=0, allow_inf_nan=False)]
 AnglePlay = Annotated[float, Unit("rad", 3e-3), Field(ge=0, allow_inf_nan=False)]
 Speed = Annotated[float, Unit("rad/s", 3.0), Field(gt=0, allow_inf_nan=False)]
+TorqueError = Annotated[float, Unit("N*m", 3e-3), Field(gt=0, allow_inf_nan=False)]
 Spread = Annotated[float, Unit("1", 0.1), Field(ge=0, le=1, allow_inf_nan=False)]
 
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
@@ -115,7 +116,7 @@ class Parameters(ParameterSet):
     """relative uncertainty of the friction"""
     spread_J: Spread
     """relative uncertainty of the accelerating torque"""
-    sigma_T: Torque
+    sigma_T: TorqueError
     """uncertainty of the torque at constant speed without friction"""
     tau: Duration
     """time for which errors of the balance persist"""

@@ -35,10 +35,11 @@ from bywire.control import clamp_force_estimator as estimator
 from bywire.control.clamp_force_estimator import Brake
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Fraction, Length, Torque, Unit
+from bywire.core.quantities import Fraction, Length, Unit
 from bywire.core.signals import Signal
 
 ForceLevel = Annotated[float, Unit("N", 5e3), Field(gt=0, allow_inf_nan=False)]
+TorqueError = Annotated[float, Unit("N*m", 3e-3), Field(gt=0, allow_inf_nan=False)]
 Spread = Annotated[float, Unit("1", 0.1), Field(ge=0, le=1, allow_inf_nan=False)]
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 Torques = Annotated[float, Signal("N*m", "sensitivity of the load torque", 0.1)]
@@ -76,7 +77,7 @@ class Parameters(ParameterSet):
     """part of these uncertainties before the first stroke; 1 if nothing is identified"""
     kept: Fraction
     """part of these uncertainties that remains after a complete stroke"""
-    sigma_T: Torque
+    sigma_T: TorqueError
     """uncertainty of a sample of the load torque"""
     memory: Fraction
     """weight of a sample's information one sample later"""
@@ -241,7 +242,8 @@ def _touched(x: State, u: Input, of: estimator.Parameters, par: Parameters) -> S
         - \frac{L[T_L] - C}{(\gamma + G) s \gamma k_1}
     """
     per_force = of.gamma + x.fit_G
-    slope = per_force * x.fit_s * of.gamma * of.k_1
+    scale = ops.fmax(x.fit_s, SMALLEST)
+    slope = per_force * scale * of.gamma * of.k_1
     doubt = CONTACT * CONTACT * _noise(u, of, par)
     fresh = ops.where(-x.h_t_2 < 0.5 * slope, u.valid, 0.0)
     pressing = ops.where(u.way > 0.5, fresh, 0.0)
@@ -256,8 +258,8 @@ def _touched(x: State, u: Input, of: estimator.Parameters, par: Parameters) -> S
         fit_theta_0=ops.where(touches, u.theta - back, x.fit_theta_0),
         h_t_1=ops.where(touches, -slope, x.h_t_1),
         h_t_2=ops.where(touches, -slope, x.h_t_2),
-        h_s_1=ops.where(touches, e / x.fit_s, x.h_s_1),
-        h_s_2=ops.where(touches, e / x.fit_s, x.h_s_2),
+        h_s_1=ops.where(touches, e / scale, x.h_s_1),
+        h_s_2=ops.where(touches, e / scale, x.h_s_2),
         h_G_1=ops.where(touches, force, x.h_G_1),
         h_G_2=ops.where(touches, force, x.h_G_2),
         P_tt=ops.where(touches, spread * spread, x.P_tt),
@@ -318,8 +320,8 @@ def _corrected(
 
 def _moved(x: State, fit: Brake) -> State:
     """Return the state with another fit, and with the sensitivities that follow from it."""
-    d_t = (fit.theta_0 - x.fit_theta_0) / x.fit_s
-    d_G = (fit.G - x.fit_G) / x.fit_s
+    scale = ops.fmax(x.fit_s, SMALLEST)
+    d_t, d_G = (fit.theta_0 - x.fit_theta_0) / scale, (fit.G - x.fit_G) / scale
     return x._replace(
         fit_theta_0=fit.theta_0,
         fit_s=fit.s,

@@ -24,7 +24,7 @@ from bywire.core.quantities import Conductance, Length, Unit, Volume
 from bywire.core.signals import Energy, Power, Pressure, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.core.validity import first, highest, row_by_row
+from bywire.core.validity import highest, row_by_row
 from bywire.plant import brake_fluid, check_valve
 
 Phase = Annotated[float, Unit("rad", 1.0), Field(allow_inf_nan=False)]
@@ -272,8 +272,7 @@ def power_loss(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameter
 @row_by_row
 def watch(t: Array, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> list[str]:
     """Warn if the delivery pressure exceeds the permitted one, or suction is below vacuum."""
-    below = "the absolute pressure at the pump's suction is below zero"
-    texts = first(t, u.p_s < -fluid.p_atm, below)
+    texts = brake_fluid.watch(t, u.p_s, fluid, "at the pump's suction")
     p = highest(u.p_d)
     if p > par.p_max:
         limit = shown(par.p_max, "Pa")

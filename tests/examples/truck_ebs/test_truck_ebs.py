@@ -10,7 +10,6 @@ import pytest
 
 import bywire
 from bywire.plant import air
-from systems.loading import loaded
 
 FOLDER = Path(__file__).parents[3] / "examples" / "truck_ebs"
 QUICK = {  # without the delays of valve, rod and pedal
@@ -30,12 +29,6 @@ QUICK = {  # without the delays of valve, rod and pedal
     "options.duration": "160 ms",
     "simulation.record": "0.02 ms",
 }
-
-
-@pytest.fixture(scope="module", autouse=True)
-def brake():
-    with loaded(FOLDER):
-        yield
 
 
 def first(level, values, t):

@@ -211,7 +211,10 @@ class Turn:
                 )
         except (ArithmeticError, ValueError):
             return False
-        return any(abs(a - b) > _JUMP * (abs(a) + abs(b)) for a, b in zip(first, last, strict=True))
+        with np.errstate(all="ignore"):  # both may be infinite
+            return any(
+                abs(a - b) > _JUMP * (abs(a) + abs(b)) for a, b in zip(first, last, strict=True)
+            )
 
 
 def _turning_point(
