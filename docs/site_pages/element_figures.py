@@ -101,10 +101,17 @@ FIGURES: dict[str, Declared] = {
     "caliper_piston": Course("x.v", 0.002, {"u.q": 1e-5}, lines=("par.d", (1e3, 2e3, 4e3))),
     "check_valve": Curve("flow", "u.p_a", (-5 * BAR, 10 * BAR), _FLUID),
     "clearance_adjuster": Course("x.taken", 0.2, {"u.turning": 1.0, "par.law": "screw"}),
+    "compressor": Curve("output.mdot", "u.p", (1.0 * BAR, 12 * BAR), {"u.on": 1.0}),
     "corner_body": Course("x.v", 3.0, {"u.F": 3000.0, "x.v": 20.0}),
     "cup_seal": Curve("output.F_p", "u.v", (0.0, 0.1), {}, ("u.p", (0.0, 20 * BAR, 40 * BAR))),
     "current_drive": Course("x.demand", 0.01, {"u.i_ref": 10.0, "u.on": 1.0}),
     "current_sensor": Curve("reading", "i", (-60.0, 60.0)),
+    "dc_link": Course(
+        "x.v",
+        0.02,
+        {"u.i_dc": lambda t: 40.0 if t < 0.005 else -40.0, "x.v": 24.0},
+        lines=("par.chopper", ("off", "resistor")),
+    ),
     "dc_motor": Course("x.i", 0.01, {"u.v": 12.0}, lines=("u.omega", (0.0, 100.0, 200.0))),
     "disc_heat": Curve("friction", "T_disc", (293.0, 1000.0), {"par.law": "lumped"}),
     "drive_supply": Course("x.P", 0.5, {"u.motors": 200.0}),
@@ -128,6 +135,9 @@ FIGURES: dict[str, Declared] = {
         "x.Omega", 0.3, {"u.friction": -200.0, "x.Omega": 60.0, "par.law": "coasting"}
     ),
     "force_sensor": Curve("force", "u.X_1", (0.0, 50 * UM)),
+    "governor": Curve(
+        "output.on", "u.p", (6.0 * BAR, 10.0 * BAR), {"x.on": 1.0}, ("x.on", (0.0, 1.0))
+    ),
     "ground_support": Curve("forces.support", "u.z", (-0.01, 0.01)),
     "h_bridge": Curve("output.v", "u.duty", (-1.0, 1.0), {"u.v_bus": 12.0}),
     "inverter": Curve(
@@ -160,6 +170,10 @@ FIGURES: dict[str, Declared] = {
     ),
     "pad_hysteresis": Course("output.F_hysteresis", 3.5, {"u.v": _strokes}, "u.v"),
     "pad_wear": Curve("wear_per_work", "T", (300.0, 900.0)),
+    "parking_cable": Curve(
+        "output.F_p", "u.tension", (0.0, 1000.0), {}, ("par.phi", (1.0, 3.0, 6.0))
+    ),
+    "pawl_lock": Curve("release_force", "torque", (0.0, 0.4), {}, ("par.mu", (0.1, 0.15, 0.2))),
     "pedal": Curve("output.x", "u.force", (0.0, 100.0)),
     "pedal_simulator": Curve("spring_force", "u.x", (-2 * MM, 20 * MM)),
     "pipeline": Curve("output.q", "u.p_a", (-10 * BAR, 10 * BAR)),
@@ -217,9 +231,13 @@ FIGURES: dict[str, Declared] = {
         {"u.on": lambda t: 1.0 if 0.005 < t < 0.015 else 0.0, "x.x": 0.18 * MM, **_FLUID},
         lines=("u.p_a", (50 * BAR, 100 * BAR, 150 * BAR)),
     ),
+    "spring_brake": Curve("spring_force", "x.x", (0.0, 0.06)),
     "stiffening_caliper": Curve("volume", "x.p", (0.0, 100 * BAR)),
     "tandem_master_cylinder": Curve(
         "output.F_spring_1", "x.x_1", (10 * MM, 28 * MM), {}, ("x.x_2", (0.0, 5 * MM, 10 * MM))
+    ),
+    "thermal_growth": Course(
+        "output.growth", 1800.0, {"x.T": 573.15}, lines=("par.tau", (300.0, 600.0, 1200.0))
     ),
     "traction_battery": Curve(
         "charging_limit", "x.soc", (0.0, 1.0), {}, ("par.T", (263.15, 273.15, 298.15))
@@ -253,10 +271,10 @@ def _saturated_map() -> dict[str, Any]:
 
 
 VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set contains or uses
-    "abs_modulator": {"tau_hold": 0.008, "tau_vent": 0.008},
     "adhesion": {"curve": "burckhardt"},
     "backlash": {"i": 1.0, "b": 10e-3, "k": 300.0, "tau": 1e-4},
     "ball_ramp": {"r": 20 * MM, "alpha": 3 * DEG, "mu": 0.0},
+    "caliper_piston": {"A_pd": 1.96e-3, "V_0": 1e-5, "m": 0.3, "d": 1e3, "G_leak": 0.0},
     "cup_seal": {
         "F_pr": 10.0,
         "f_p": 1e-5,
@@ -264,6 +282,16 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "k_brk": 1.5,
         "v_S": 5e-3,
         "mu": 50.0,
+    },
+    "dc_link": {
+        "law": "diode",
+        "V_s": 24.0,
+        "R_s": 0.02,
+        "C": 5e-3,
+        "chopper": "off",
+        "V_on": 30.0,
+        "R_on": 0.05,
+        "V_most": 60.0,
     },
     "drum": {
         "law": "simplex",
@@ -276,7 +304,6 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "mu": 0.35,
     },
     "flux_map": _saturated_map(),
-    "lead_screw": {"lead": 4 * MM, "d_m": 20 * MM, "mu": 0.12, "beta": 15 * DEG},
     "pad_hysteresis": {
         "law": "constant",
         "k_1": 1e7,
@@ -289,6 +316,7 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "W_4": 100.0,
         "F_ref": 2e4,
     },
+    "parking_cable": {"mu": 0.1, "phi": 3.0, "i": 5.0},
     "pad_wear": {
         "kappa_0": 3.6e-14,
         "T_hot": 503.0,
@@ -310,6 +338,7 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "G": 60 * BAR,
     },
     "rack": {"r_p": 15 * MM, "eta": 0.9},
+    "seal_rollback": {"k": 6e5, "z_max": 0.06 * MM},
     "solenoid_armature": {
         **_SEAT,
         "unpowered": "closed",
@@ -333,27 +362,6 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "k_s1": 4e3,
         "F_s2": 60.0,
         "k_s2": 4e3,
-    },
-    "traction_battery": {
-        "law": "cells",
-        "P_max": 25e3,
-        "Q": 1.35e5,
-        "V_0": 320.0,
-        "V_1": 410.0,
-        "V_max": 410.0,
-        "R": 0.4,
-        "I_max": 75.0,
-        "T": 298.15,
-        "T_cold": 263.15,
-        "T_warm": 283.15,
-    },
-    "wheel_motor": {
-        "T_max": 500.0,
-        "P_max": 25e3,
-        "eta": 0.9,
-        "v_1": 15.0 / 3.6,
-        "v_2": 5.0 / 3.6,
-        "tau": 0.01,
     },
 }
 

@@ -54,6 +54,18 @@ PMSM_PANELS = Panels(
     ),
 )
 
+PARKING_PANELS = Panels(
+    "emb-parking",
+    ("emb-parking",),
+    (
+        Panel("clamp force", (Trace("F_cl"),), height=1.8),
+        Panel("disc temperature", (Trace("T_disc"),)),
+        Panel("piston travel", (Trace("travel"),)),
+        Panel("current", (Trace("i"),)),
+        Panel("shaft torque", (Trace("T_fr"), Trace("T_pawl", LineRole.SECOND))),
+    ),
+)
+
 SLIDERS = Sliders(
     "emb-caliper",
     ("emb-caliper",),
@@ -77,5 +89,17 @@ PMSM_SLIDERS = Sliders(
         "motor.psi",
         "caliper.clearance",
         "ecu.current.omega_c",
+    ),
+)
+PARKING_SLIDERS = Sliders(
+    "emb-parking",
+    ("emb-parking",),
+    (
+        "screw.mu",
+        "screw.lead",
+        "disc.length",
+        "parking.F_park",
+        "parking.F_again",
+        "parking.t_again",
     ),
 )

@@ -99,8 +99,8 @@ class CascadeParameters(ParameterSet):
         ratio = self.T_force / self.T_current
         if ratio < 1.0 or abs(ratio - round(ratio)) > 1e-9:
             raise ValueError(
-                f"T_force = {self.T_force:g} s must be a whole multiple of T_current = "
-                f"{self.T_current:g} s"
+                f"T_current = {1e3 * self.T_current:g} ms must divide T_force = "
+                f"{1e3 * self.T_force:g} ms. For example, use T_current = {100 * self.T_force:g} ms"
             )
         if self.feedback != "sensor" and self.estimation == "off":
             raise ValueError(

@@ -5,16 +5,11 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from bywire.authoring import Signal, signals
+from bywire.core import ops
 from bywire.plant import solenoid_valve
 from bywire.vehicle import slip_control
 from one_box import ecu
 from one_box.laws import valve_pressure
-
-
-class Parameters(slip_control.Parameters):
-    """Slip control, and control of the valves."""
-
-    valves: valve_pressure.Parameters
 
 
 class Commands(NamedTuple):
@@ -49,16 +44,15 @@ Memory: Any = signals.joined(__name__, "Memory", ecu.Memory, ValveMemory, slip_c
 """memory of the plunger's ECU and of anti-lock control"""
 
 
-def tick(r: slip_control.Readings, p: float, m: Any, par: Any) -> Any:
-    """Run slip control and the control of the valves once; ``p``: plunger pressure [Pa]."""
-    law = par.antilock
-    m = slip_control.tick(r, m, law.slip.k_hat * m.p_ref, law)
-    p_ref = m.M_left / law.slip.k_hat
+def tick(m: Any, p: float, par: Any) -> Any:
+    """Run the control of the valves once after slip control; ``p``: plunger pressure [Pa]."""
+    p_ref = m.M_left / par.antilock.slip.k_hat
+    p = ops.where(m.refill > 0.5, ops.fmax(p, m.p_kept), p)  # behind the separation valve
     state, out = valve_pressure.output(
         valve_pressure.State(m.p_hat, m.building, m.dumping, m.switched, m.V_hat),
         valve_pressure.Input(p_ref, p, m.abs),
-        law.T_s,
-        law.valves,
+        par.antilock.T_s,
+        par.valves,
     )
     return m._replace(
         p_wheel_ref=p_ref,

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from annotated_types import Ge
+
 from bywire.authoring import Limited, Signal
 from bywire.control import current_pi, pedal_map, position_pd
 from bywire.core import ops
-from bywire.plant import h_bridge
-from one_box.laws import plunger_pressure
+from bywire.plant import h_bridge, solenoid_valve
+from one_box.laws import plunger_pressure, refill
 
 
 class Stimulus(NamedTuple):
     """External inputs. ``drive`` determines which of the demands acts."""
 
-    F_foot: Annotated[float, Signal("N", "foot force", 100.0)]
-    p_set: Annotated[float, Signal("Pa", "pressure demand", 5e6)]
+    F_foot: Annotated[float, Signal("N", "foot force", 100.0), Ge(0)]
+    p_set: Annotated[float, Signal("Pa", "pressure demand", 5e6), Ge(0)]
     theta_set: Annotated[float, Signal("rad", "motor angle demand", 10.0)]
     i_set: Annotated[float, Signal("A", "current demand", 20.0)]
 
@@ -29,6 +31,13 @@ class Memory(NamedTuple):
     omega_ref: Annotated[float, Signal("rad/s", "speed of the set point", 50.0)]
     theta_last: Annotated[float, Signal("rad", "previous measured motor angle", 10.0)]
     omega_meas: Annotated[float, Signal("rad/s", "measured motor speed", 50.0)]
+    refill: Annotated[float, Signal("1", "phase of the refill", 2.0)]
+    p_kept: Annotated[float, Signal("Pa", "pressure that the brakes keep", 5e6)]
+    separate: Annotated[float, Signal("1", "separation valve command")]
+    separate_on: Annotated[float, Signal("1", "separation valve energized")]
+    separate_waiting: Annotated[
+        float, Signal("s", "time since the separation command changed", 1e-3)
+    ]
     i_ref: Annotated[float, Signal("A", "current set point", 20.0, set_point_of="i")]
     duty: Annotated[float, Signal("1", "duty cycle", 0.3), Limited("ecu.current.D_max")]
     pi_integral: Annotated[float, Signal("1", "integral term of the current PI", 0.3)]
@@ -55,10 +64,27 @@ def demand_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
 
 
 def pressure_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
-    """Run pressure control of the plunger once."""
+    """Run pressure control of the plunger once, or refill the plunger near its end."""
+    law = par.ecu.refill
+    before = refill.State(m.refill, m.p_kept)
+    state = refill.output(before, refill.Input(m.p_ref, r.theta, r.p), law)
+    retracts = ops.where(ops.fabs(state.phase - refill.RETRACTS) < 0.5, m.separate_on, 0.0)
     reference = plunger_pressure.State(m.theta_ref)
-    seen = plunger_pressure.Input(m.p_ref, r.p)
-    return m._replace(omega_ref=plunger_pressure.output(reference, seen, par.ecu.pressure))
+    seen = plunger_pressure.Input((1.0 - retracts) * m.p_ref, r.p)
+    controlled = plunger_pressure.output(reference, seen, par.ecu.pressure)
+    return m._replace(
+        omega_ref=ops.where(state.phase > 1.5, law.omega, controlled),
+        refill=state.phase,
+        p_kept=state.p_kept,
+        separate=ops.where(state.phase > 0.5, 1.0, 0.0),
+    )
+
+
+def separate_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
+    """Pass the command on to the separation valve after its delay."""
+    coil = solenoid_valve.Coil(m.separate_on, m.separate_waiting)
+    coil = solenoid_valve.delayed(coil, m.separate, par.ecu.T_s, par.separation)
+    return m._replace(separate_on=coil.on, separate_waiting=coil.waiting)
 
 
 def position_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:

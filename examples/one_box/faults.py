@@ -16,8 +16,8 @@ CORNER_CHANNELS = Channels(
     "one-box-corner",
     (
         *_COMMON,
-        Channel("inlet-driver", "inlet valve driver", "1", "close", "drive", task="antilock"),
-        Channel("outlet-driver", "outlet valve driver", "1", "release", "drive", task="antilock"),
-        Channel("pump-relay", "relay of the return pump", "1", "pump", "drive", task="antilock"),
+        Channel("inlet-driver", "inlet valve driver", "1", "close", "drive", task="valves"),
+        Channel("outlet-driver", "outlet valve driver", "1", "release", "drive", task="valves"),
+        Channel("pump-relay", "relay of the return pump", "1", "pump", "drive", task="valves"),
     ),
 )

@@ -9,12 +9,12 @@ from bywire.authoring import Assembly, Bounds, Integral, Part, Port, Role, Shown
 from bywire.plant import (
     ball_screw_gear,
     battery_supply,
+    brake_fluid,
     check_valve,
     dc_motor,
     end_stop,
     h_bridge,
     master_cylinder,
-    orifice,
     pedal_simulator,
     reservoir_port,
     seal_friction,
@@ -32,12 +32,13 @@ MemoryT = TypeVar("MemoryT")
 class Hydraulics(Assembly[ParT, MemoryT]):
     """Parts and wires of the brake, alone or with its anti-lock valves.
 
-    One dry friction acts on the motor shaft with its seals. If the plunger retracts faster than
-    fluid returns, its cup seal admits fluid from the reservoir, like a check valve.
+    One dry friction acts on the motor shaft with its seals. The plunger's pressure is one-sided,
+    because its cup seal admits fluid from the reservoir.
     """
 
     Stimulus: ClassVar = ecu.Stimulus
     frictions: ClassVar[tuple[str, ...]] = ("omega",)
+    limits: ClassVar[tuple[str, ...]] = ("p_mc",)
     shared: ClassVar[tuple[str, ...]] = ("fluid",)
 
     E_source = Integral("J", "energy from the battery", role=Role("source", "battery"))
@@ -52,16 +53,17 @@ class Hydraulics(Assembly[ParT, MemoryT]):
     E_friction = Integral("J", "dry friction of screw and seals", role=Role("sink", "dry friction"))
     chamber = Part(master_cylinder, par="plunger", state={"p": "p_mc"}, loss="E_damping")
     port = Part(reservoir_port)
-    E_port = Integral("J", "energy lost through the port", role=Role("sink", "reservoir"))
-    makeup = Part(check_valve, loss="E_makeup")
+    E_port = Integral(
+        "J", "energy lost through the port", role=Role("sink", "reservoir", returns="taken")
+    )
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
-    line = Part(orifice, loss="E_line")
+    separation = Part(solenoid_valve, suffix="_s", which="separation valve", loss="E_separation")
     others = Part(stiffening_caliper, suffix="_o", which="other brakes")
     inlet = Part(solenoid_valve, suffix="_in", which="inlet valve", loss="E_inlet")
     check = Part(check_valve, loss="E_check")
     caliper = Part(stiffening_caliper)
     V_given = Integral("m**3", "volume from the reservoir")
-    V_filled = Integral("m**3", "volume from the plunger into the wheel")
+    V_filled = Integral("m**3", "volume that flowed into the wheel")
     V_squeezed = Integral("m**3", "compression of the fluid in the plunger's chamber")
 
     closed = Port("1", "inlet valve energized", 0.5)
@@ -72,9 +74,9 @@ class Hydraulics(Assembly[ParT, MemoryT]):
     i_dc = Wire("A", "battery current", 20.0)
     torque = Wire("N*m", "motor torque", 2.0)
     load = Wire("N", "load on the plunger", 2e3)
+    q_plunger = Wire("m**3/s", "flow out of the plunger", 1e-5)
     q_in = Wire("m**3/s", "flow into the wheel", 1e-5)
     x_foot = Shown("m", "pedal travel", 0.05)
-    q_makeup = Wire("m**3/s", "flow from the reservoir", 1e-5)
     V_missing = Shown("m**3", "residual of the volume balance", 1e-9)
 
     def wire(self, w: Any) -> None:
@@ -91,7 +93,7 @@ class Hydraulics(Assembly[ParT, MemoryT]):
 
     def power(self, w: Any) -> dict[str, float]:
         """Return the powers and flows that do not follow from the parts."""
-        fluid, p = w.par.fluid, w.chamber.x.p
+        fluid, p, makeup = w.par.fluid, w.chamber.x.p, w.reaction[len(self.frictions)]
         leak = reservoir_port.output(w.port.u, w.port.par).G * p
         lost = reservoir_port.power_loss(w.port.u, w.port.par, fluid)
         chamber = master_cylinder.mass(w.chamber.x, w.chamber.u, w.chamber.par, fluid)
@@ -100,8 +102,8 @@ class Hydraulics(Assembly[ParT, MemoryT]):
             "E_source": battery_supply.power_source(w.supply.u, w.supply.par),
             "E_foot": pedal_rod.foot_power(w.rod.x, w.rod.u, w.rod.par),
             "E_friction": -w.reaction[0] * w.gear.x.omega,
-            "E_port": lost,
-            "V_given": w.q_makeup - leak,
+            "E_port": lost - brake_fluid.convected_power(makeup, p, fluid),
+            "V_given": makeup - leak,
             "V_filled": w.q_in,
             "V_squeezed": chamber * w.rate.p_mc,
         }
@@ -128,6 +130,7 @@ class Hydraulics(Assembly[ParT, MemoryT]):
             Task("pressure", par.ecu.T_s, _reading(ecu.pressure_tick)),
             position,
             current,
+            Task("separation", par.ecu.T_s, _reading(ecu.separate_tick)),
         )
 
     def antilock(self, par: Any) -> tuple[Task, ...]:
@@ -150,23 +153,21 @@ def _pedal(w: Any) -> None:
 
 
 def _hydraulics(w: Any) -> None:
-    """Connect plunger, inlet valve, calipers and reservoir."""
-    fluid, p, p_w = w.par.fluid, w.chamber.x.p, w.caliper.x.p
-    w.line.u = orifice.Input(p, w.others.x.p, 1.0)
-    w.inlet.u = solenoid_valve.Input(w.closed, p, p_w)
-    w.check.u = check_valve.Input(p_w, p)
-    to_others = orifice.flow(w.line.u, w.line.par, fluid)
+    """Connect plunger, separation and inlet valve, calipers and reservoir."""
+    fluid, p, p_o, p_w = w.par.fluid, w.chamber.x.p, w.others.x.p, w.caliper.x.p
+    w.separation.u = solenoid_valve.Input(w.m.separate_on, p, p_o)
+    w.inlet.u = solenoid_valve.Input(w.closed, p_o, p_w)
+    w.check.u = check_valve.Input(p_w, p_o)
+    valve = w.separation
+    w.q_plunger = solenoid_valve.flow(valve.x, valve.u, valve.par, fluid)
     back = check_valve.flow(w.check.u, w.check.par, fluid)
     w.q_in = solenoid_valve.flow(w.inlet.x, w.inlet.u, w.inlet.par, fluid) - back
-    w.others.u = stiffening_caliper.Input(to_others)
+    w.others.u = stiffening_caliper.Input(w.q_plunger + w.q_pump - w.q_in)
     w.caliper.u = stiffening_caliper.Input(w.q_in - w.q_out)
     piston = ball_screw_gear.output(w.gear.x, w.gear.par)
     w.port.u = reservoir_port.Input(piston.x - w.chamber.par.x_rest, p)
     leak = reservoir_port.output(w.port.u, w.port.par).G * p
-    w.makeup.u = check_valve.Input(0.0, p)
-    w.q_makeup = check_valve.flow(w.makeup.u, w.makeup.par, fluid)
-    out = to_others + w.q_in + leak - w.q_makeup - w.q_pump
-    w.chamber.u = master_cylinder.Input(piston.x, piston.v, out)
+    w.chamber.u = master_cylinder.Input(piston.x, piston.v, w.q_plunger + leak)
 
 
 def _drive(w: Any) -> None:
@@ -192,7 +193,8 @@ def _given(w: Any) -> float:
     cylinder = w.chamber.par
     turned = w.gear.x.theta - w.par.ecu.pressure.theta_rest
     displaced: float = cylinder.A_mc * w.gear.par.k_g * turned
-    return displaced + w.flow.V_given - w.flow.V_squeezed
+    outside: float = w.flow.V_given - w.flow.V_squeezed
+    return displaced + outside
 
 
 def _reading(law: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
@@ -209,6 +211,7 @@ def released_parts(par: OneBoxParameters) -> dict[str, Any]:
     return {
         "rod": pedal_rod.State(-par.rod.F_0 / (par.pedal_stop.k_stop + par.simulator.k_1), 0.0),
         "gear": ball_screw_gear.State(par.ecu.pressure.theta_rest, 0.0),
+        "separation": solenoid_valve.State(solenoid_valve.lift(0.0, par.separation)),
         "inlet": solenoid_valve.State(solenoid_valve.lift(0.0, par.inlet)),
     }
 

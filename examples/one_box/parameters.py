@@ -15,7 +15,6 @@ from bywire.plant import (
     end_stop,
     h_bridge,
     master_cylinder,
-    orifice,
     pedal_simulator,
     reservoir_port,
     seal_friction,
@@ -23,7 +22,7 @@ from bywire.plant import (
     stiffening_caliper,
 )
 from one_box.elements import pedal_rod
-from one_box.laws import plunger_pressure
+from one_box.laws import plunger_pressure, refill
 
 DriveMode = Literal["pedal", "pressure", "position", "current"]
 
@@ -43,6 +42,7 @@ class EcuParameters(ParameterSet):
     """rod travel at the end of the sensor's range"""
     pedal_map: pedal_map.Parameters
     pressure: plunger_pressure.Parameters
+    refill: refill.Parameters
     position: position_pd.Parameters
     current: current_pi.Parameters
 
@@ -65,9 +65,8 @@ class OneBoxParameters(ParameterSet):
     seal: seal_friction.Parameters
     plunger: master_cylinder.Parameters
     port: reservoir_port.Parameters
-    makeup: check_valve.Parameters
     stop: end_stop.Parameters
-    line: orifice.Parameters
+    separation: solenoid_valve.Parameters
     others: stiffening_caliper.Parameters
     inlet: solenoid_valve.Parameters
     check: check_valve.Parameters

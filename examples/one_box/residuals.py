@@ -46,7 +46,22 @@ def _torque(signals: Signals, par: Any, dt: float) -> Array:
     return _held(signals, dt, np.abs(par.ecu.position.K_hat * signals["i"] - load))
 
 
+def _slip(signals: Signals, par: Any, dt: float) -> Array:
+    """Return the slip above the speed at which anti-lock control fades out, otherwise none."""
+    is_fast = signals["v_hat"] > par.antilock.rules.v_fall
+    return np.where(is_fast, np.abs(signals["slip_hat"]), _NEVER)
+
+
 RESIDUALS = (
+    Residual(
+        "wheel-slip",
+        "slip of the wheel, which anti-lock control limits",
+        "one-box-corner",
+        "1",
+        ("slip_hat", "v_hat"),
+        _slip,
+        hold=50e-3,
+    ),
     Residual(
         "plunger-pressure",
         "pressure demand and measured pressure",

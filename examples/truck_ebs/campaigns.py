@@ -16,3 +16,15 @@ CAMPAIGN = DeclaredCampaign(
         ],
     },
 )
+PARKING = DeclaredCampaign(
+    "truck-park",
+    "every fault of the truck's brake while all air is lost on a slope",
+    {
+        "bench": "park",
+        "vary": {"disc.mu": "+-10 %", "corner.body.m": "+-10 %"},
+        "campaign": {"onset": "1 s", "spread": "0.1 s", "onsets": 1, "healthy": 16},
+        "criteria": [
+            {"name": "rolls away", "signal": "s", "below_healthy": "0.1 m", "lasting": "0.1 s"}
+        ],
+    },
+)

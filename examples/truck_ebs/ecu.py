@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from annotated_types import Ge
+
 from bywire.authoring import Limited, Signal
 from bywire.core import ops
 from truck_ebs.laws import pressure_control
@@ -12,7 +14,7 @@ from truck_ebs.laws import pressure_control
 class Stimulus(NamedTuple):
     """External inputs."""
 
-    p_set: Annotated[float, Signal("Pa", "pressure demand", 4e5)]
+    p_set: Annotated[float, Signal("Pa", "pressure demand", 4e5), Ge(0)]
 
 
 class Memory(NamedTuple):
@@ -23,7 +25,7 @@ class Memory(NamedTuple):
     ]
     p_meas: Annotated[float, Signal("Pa", "measured pressure", 4e5)]
     p_control: Annotated[float, Signal("Pa", "control pressure", 4e5), Limited("ecu.p_max")]
-    integral: Annotated[float, Signal("Pa", "integral part of the pressure control", 1e4)]
+    integral: Annotated[float, Signal("Pa", "integral term of the pressure control", 1e4)]
 
 
 def tick(x: Any, m: Any, u: Stimulus, par: Any) -> Any:

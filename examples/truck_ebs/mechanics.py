@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from bywire.authoring import Assembly, Bounds, Integral, Part, Role, Shown, Task, Wire
+from bywire.core import ops
 from bywire.plant import (
     air,
     air_orifice,
@@ -91,7 +92,9 @@ class AirBrake(Assembly[ParT, MemoryT]):
     def relayed(self, w: Any, outlet: Air) -> Flow:
         """Connect the relay valve to the air at its outlet, and return the flow into it."""
         gas, supply = w.par.gas, self.reservoir(w)
-        w.relay.u = relay_valve.Input(w.m.p_control, outlet.p - gas.p_atm)
+        # The pilot valve takes its air from the same reservoir.
+        control = ops.fmin(w.m.p_control, supply.p - gas.p_atm)
+        w.relay.u = relay_valve.Input(control, outlet.p - gas.p_atm)
         seats = relay_valve.output(w.relay.x, w.relay.par)
         w.feed.u = air_orifice.Input(supply.p, outlet.p, supply.T, outlet.T, seats.feed)
         w.outlet.u = air_orifice.Input(outlet.p, gas.p_atm, outlet.T, gas.T_0, seats.exhaust)

@@ -32,11 +32,8 @@ PARK_PANELS = Panels(
     "truck-park",
     ("truck-park",),
     (
-        Panel(
-            "pressure",
-            (Trace("p"), Trace("p_park", LineRole.SECOND), Trace("p_tank", LineRole.THIRD)),
-            height=1.8,
-        ),
+        Panel("pressure", (Trace("p"), Trace("p_park", LineRole.SECOND)), height=1.8),
+        Panel("pressure of the tank", (Trace("p_tank"),)),
         Panel("piston travel", (Trace("x_spring"), Trace("x", LineRole.SECOND))),
         Panel("force of the spring brake", (Trace("F_push"),)),
         _FORCE,

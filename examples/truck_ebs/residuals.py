@@ -36,7 +36,7 @@ RESIDUALS = (
     Residual(
         "pressure",
         "measured pressure and the set points of the last second",
-        "truck-ebs",
+        ("truck-ebs", "truck-park"),
         "Pa",
         ("p_ref", "p_meas"),
         _pressure,
@@ -45,7 +45,7 @@ RESIDUALS = (
     Residual(
         "correction",
         "correction that the relay valve needs to reach the set point",
-        "truck-ebs",
+        ("truck-ebs", "truck-park"),
         "Pa",
         ("integral",),
         _correction,

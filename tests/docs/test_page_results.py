@@ -92,6 +92,30 @@ def test_a_block_that_fails_stops_the_site(
         results.play(results.steps(page(commands, words)), tmp_path)
 
 
+def test_a_command_prints_the_same_in_a_copy_of_a_loaded_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for each in ("bywire list loops", "bywire run hard-braking --set motor.R_m=x"):
+        copied = results._output("sh", each, tmp_path)
+        with monkeypatch.context() as without:
+            without.setattr(results.fork_server, "can_fork", lambda: False)
+            assert results._output("sh", each, tmp_path) == copied
+
+
+@pytest.mark.parametrize(
+    ("command", "needs"),
+    [
+        ('bywire design pressure --require "overshoot <= 15 %"', False),
+        ("bywire list loops   # a | b", False),
+        ("bywire list loops | head", True),
+        ("bywire list loops; true", True),
+        ("bywire run hard-braking --out $HOME", True),
+    ],
+)
+def test_only_commands_with_operators_need_a_shell(command: str, needs: bool) -> None:
+    assert results._needs_shell(command) is needs
+
+
 def test_results_are_kept_until_page_or_sources_change(tmp_path: Path) -> None:
     counted = "bywire list loops; echo x >> {}".format(tmp_path / "count")
 

@@ -157,7 +157,7 @@ def _blown_up(result: Any, said: str) -> str:
         books = actuator_ledger(recording) if "time" in recording.sizes else None
         if books and books.sources and books.sinks and recording.sizes["time"]:
             is_open = abs(books.closing_error) > 1e-4 * books.turnover + 1e-9
-            if is_open and "energy balance is off" not in said:
+            if is_open and "energy balance has an error" not in said:
                 return f"{label}: {books.closing_error:.3g} J of {books.turnover:.3g} J are open"
     for kpi in getattr(result, "kpis", ()):
         if not np.isfinite(kpi.value) and not (kpi.note or "warning" in said):

@@ -22,14 +22,14 @@ MOTOR = {
 }
 
 
-LAW = {"category": "B", "rate": 1e5, "T_least": 0.0, "t_off": 0.05}
+LAW = {"category": "B", "rate": 1e5, "T_least": 0.0, "t_off": 0.05, "t_back": 0.3}
 
 
 def stop(law, P_bat=25e3):
     """Return time, speed, demand, motor torque and friction torque of a stop from 100 km/h."""
     motor = wheel_motor.Parameters.create(MOTOR)
     par = blending.Parameters.create(LAW | {"law": law})
-    x, state, T_b, v = wheel_motor.State(0.0), blending.State(0.0), 0.0, 100 / 3.6
+    x, state, T_b, v = wheel_motor.State(0.0), blending.State(0.0, 0.0), 0.0, 100 / 3.6
     ticks = round(T_D / T)
     reports, commands = (deque([0.0] * ticks, ticks) for _ in range(2))
     rows = []
@@ -90,17 +90,28 @@ def test_a_full_battery_leaves_the_stop_to_the_friction_brake():
 
 def test_slip_control_takes_the_motor_out_within_its_time():
     par = blending.Parameters.create(LAW | {"law": "commanded"})
-    state, u = blending.State(300.0), blending.Input(360.0, 0.0, 300.0, 300.0, 300.0, 1.0)
+    state, u = blending.State(300.0, 0.0), blending.Input(360.0, 0.0, 300.0, 300.0, 300.0, 1.0)
     for _ in range(50):
         state, out = blending.output(state, u, T, par)
     assert out.T_motor == pytest.approx(0.0, abs=1e-9)
     assert out.T_friction == pytest.approx(360.0)
 
 
+def test_the_motor_waits_after_slip_control():
+    par = blending.Parameters.create(LAW | {"law": "commanded"})
+    state, u = blending.State(300.0, 0.0), blending.Input(360.0, 0.0, 300.0, 300.0, 300.0, 0.0)
+    torques = []
+    for k in range(500):
+        state, out = blending.output(state, u._replace(slip=1.0 if k < 10 else 0.0), T, par)
+        torques.append(out.T_motor)
+    assert torques[300] == 0.0  # 0.3 s after the last tick of slip control
+    assert torques[320] == 300.0
+
+
 def test_outside_the_service_brake_the_motor_adds_to_the_friction_demand():
     par = blending.Parameters.create(LAW | {"category": "A", "law": "reported"})
     u = blending.Input(360.0, 80.0, 300.0, 300.0, 80.0, 0.0)
-    state, out = blending.output(blending.State(0.0), u, T, par)
+    state, out = blending.output(blending.State(0.0, 0.0), u, T, par)
     assert out == (80.0, 360.0)
     _, within = blending.output(state, u, T, par.replace({"category": "B"}))
     assert within == (180.0, 360.0)  # 440 N m of both demands, of which 80 N m are reported

@@ -34,6 +34,7 @@ CHAMBER = {
     "A_table": (0.014, 0.014, 0.009),
     "F_s0": 420.0,
     "k_s": 8e3,
+    "G_leak": 0.0,
 }
 STORE = {"p_0": 1.5 * BAR, "k": BAR / 1e-6, "V_max": 3.5e-6, "c_stop": 4e-15}
 
@@ -64,7 +65,9 @@ def test_a_chamber_needs_a_curve(changes, name):
 
 
 def test_a_relay_valve_holds_within_its_overlap_and_never_opens_both_seats():
-    par = relay_valve.Parameters.create({"tau": 12e-3, "overlap": 0.05, "p_full": 0.5 * BAR})
+    lag = {"law": "lag", "tau": 12e-3, "overlap": 0.05, "p_full": 0.5 * BAR}
+    mechanical = {"a": 1.0, "p_crack": 0.1 * BAR, "p_fr": 0.04 * BAR}  # without effect
+    par = relay_valve.Parameters.create(lag | mechanical)
     openings = [relay_valve.output(relay_valve.State(s), par) for s in np.linspace(-1, 1, 201)]
     assert all(out.feed * out.exhaust == 0.0 for out in openings)
     held = [out == (0.0, 0.0) for out in openings]

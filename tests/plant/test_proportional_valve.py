@@ -234,3 +234,15 @@ def test_a_valve_needs_a_seat():
     with raises(ParameterError, name="seat.d"):
         proportional_valve.Parameters.create(values)
     assert math.isclose(proportional_valve.area(parameters().valve), math.pi * 0.25e-3**2)
+
+
+@pytest.mark.parametrize(("k_stop", "warned"), [(2e5, False), (10.0, True)])
+def test_a_needle_that_passes_its_seat_is_reported(k_stop, warned):
+    """The current presses the needle on its seat with 3 N, which a stiff seat carries."""
+    par = parameters({"stop.k_stop": k_stop})
+    result = driven(par, constant(3.0, 0.0, 0.0), 0.05)
+    x = proportional_valve.State(result["x"], result["v"])
+    texts = proportional_valve.watch(result.time, x, par.valve)
+    assert len(texts) == warned
+    assert all(text.startswith("the needle passes its seat or its stop at t =") for text in texts)
+    assert all("Connect an end_stop from 0 to lift" in text for text in texts)

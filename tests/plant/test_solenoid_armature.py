@@ -262,3 +262,22 @@ def test_faults(fault, moves, closes):
 def test_a_valve_that_cannot_work_is_rejected(changes, name):
     with raises(ParameterError, name=name):
         parameters(changes)
+
+
+@pytest.mark.parametrize(
+    ("k_stop", "v", "text"),
+    [
+        (5e6, 12.0, ""),
+        (10.0, 0.0, "the armature leaves its near end"),
+        (5e4, 12.0, "the armature closes its air gap"),
+    ],
+)
+def test_a_missing_or_soft_stop_is_reported(k_stop, v, text):
+    """The spring presses with 4 N on the near end, and the magnetic force with 40 N on the far."""
+    par = parameters({"stop.k_stop": k_stop})
+    result = switched(par, p=0.0, v=v)
+    x = solenoid_armature.State(result["psi"], result["x"], result["v"])
+    texts = solenoid_armature.watch(result.time, x, par.valve)
+    assert bool(texts) == bool(text)
+    assert any(each.startswith(text) for each in texts) == bool(text)
+    assert all("Connect an end_stop" in each for each in texts)

@@ -72,7 +72,7 @@ BANNED = (
     Banned(r"\bType for example\b", "Type for example --at 2", "For example, type"),
     Banned(r"\bsooner or later\b", "one tick sooner or later", "earlier or later"),
     Banned(
-        r"\b(?:integral|derivative|proportional) parts?\b",
+        r"\b(?:[Ii]ntegral|[Dd]erivative|[Pp]roportional) parts?\b",
         "integral part of the current PI",
         "integral term",
     ),
@@ -95,10 +95,8 @@ BANNED = (
 )
 IN_GUIDES = (
     *BANNED,
-    Banned(r"\bcounts? as\b", "it counts as released", "is treated as, is considered"),
     Banned(r"\bfrictions\b", "two frictions and a contact", "friction forces, friction states"),
     Banned(r"\bhealthy runs?\b", "compared with a healthy run", "fault-free run"),
-    Banned(r"\b[Ii]ntegral part\b", "the integral part of the PID", "integral term, integrator"),
     Banned(r"\bat the (?:[a-z]+ )?instant\b", "at the instant of the slip", "at the time"),
     Banned(r"\b(?:finished|large|small|larger) share\b", "a finished share of 5 %", "fraction"),
     Banned(r"\b(?:all|two|the stated) figures (?:agree|differ)", "all figures agree", "values"),

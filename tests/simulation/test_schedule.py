@@ -73,6 +73,20 @@ def test_a_step_far_from_any_divisor_is_refused_at_once(
 
 
 @pytest.mark.parametrize(
+    ("current", "step"), [(33e-6, "1 us"), (62.5e-6, "15.625 us"), (0.25e-3, "15.625 us")]
+)
+def test_the_proposed_step_divides_all_intervals(current: float, step: str) -> None:
+    """A step that divides only the rejected interval would be rejected again."""
+    periods = {"force": 1e-3, "current": current}
+    with pytest.raises(StepError) as caught:
+        plan(0.1, 20e-6, periods, 1e-3)
+    proposed = parse(caught.value.valid, "s", "step")
+    plan(0.1, proposed, periods, 1e-3)
+    assert proposed == pytest.approx(parse(step, "s", "step"))
+    assert "or an interval that is a multiple of 0.02 ms" in str(caught.value)
+
+
+@pytest.mark.parametrize(
     ("duration", "step"), [(0.1, 0.0), (0.1, -1e-5), (0.1, np.nan), (0.0, 2e-5)]
 )
 def test_neither_zero_nor_negative(duration: float, step: float) -> None:

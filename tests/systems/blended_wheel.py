@@ -183,6 +183,7 @@ _NUMBERS = {
     "regeneration.blending.rate": 1e5,
     "regeneration.blending.T_least": 0.0,
     "regeneration.blending.t_off": 0.05,
+    "regeneration.blending.t_back": 0.3,
     "regeneration.bus.T_d": 0.01,
     "regeneration.T_s": 1e-3,
     "regeneration.t_ahead": 0.07,

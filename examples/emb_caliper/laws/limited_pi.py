@@ -59,13 +59,13 @@ class SpeedInput(NamedTuple):
 
 
 class ForceState(NamedTuple):
-    """Integral part."""
+    """Integral term."""
 
     integral: Annotated[float, Signal("rad/s", "integral term of the force PI", 10.0)]
 
 
 class SpeedState(NamedTuple):
-    """Integral part."""
+    """Integral term."""
 
     integral: Annotated[float, Signal("A", "integral term of the speed PI", 5.0)]
 

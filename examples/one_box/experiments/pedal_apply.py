@@ -88,22 +88,21 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     held, demand = float(p[hold]), float(run["p_ref"][hold])
     applied = (t >= 0.0) & (t <= options.t_hold)
     return FIGURES(
-        time_to_90=_first(t[applied], p[applied] >= 0.9 * held),
+        time_to_90=_first(t[applied & (p >= 0.9 * held)], 0.0),
         wheel_pressure=held,
         overshoot=float(p_mc.max()) - demand,
         error_held=demand - float(p_mc[hold]),
         pedal_travel=float(run["x_foot"][hold]),
-        time_to_release=_first(t[hold:] - options.t_hold, p[hold:] <= 0.1 * held),
+        time_to_release=_first(t[~applied & (t > 0.0) & (p <= 0.1 * held)], options.t_hold),
         current_max=float(abs(run["i"]).max()),
         supply_energy=float(run["E_source"][-1] - run["E_source"][0]),
         volume_error=float(abs(run["V_missing"]).max()),
     )
 
 
-def _first(t: Array, reached: Array) -> float:
-    """Return the first time at which a condition holds."""
-    found = np.flatnonzero(reached)
-    return float(t[found[0]]) if found.size else math.nan
+def _first(times: Array, start: float) -> float:
+    """Return the first of some times, relative to a start."""
+    return float(times[0]) - start if times.size else math.nan
 
 
 EXPERIMENT = Experiment(

@@ -9,6 +9,7 @@ from bywire.plant import brake_disc, road, road_wheel, wheel_encoder
 from bywire.vehicle import Corner, CornerParameters, WheelSpeed, rolling_states, slip_control
 from one_box import antilock
 from one_box.hydraulics import released_memory
+from one_box.laws import valve_pressure
 from one_box.modulator import Modulator, ModulatorParameters, modulator_parts
 
 
@@ -22,16 +23,20 @@ class OneBoxCornerParameters(ModulatorParameters):
     disc: brake_disc.Parameters
     wheel: road_wheel.Parameters
     corner: CornerParameters
-    antilock: antilock.Parameters
+    antilock: slip_control.Parameters
+    valves: valve_pressure.Parameters
+
+
+_DISC = 2  # place of the disc among the dry frictions
 
 
 class OneBoxCorner(Corner[OneBoxCornerParameters, Any], Modulator[OneBoxCornerParameters, Any]):
-    """The brake at a wheel. A second dry friction acts on the disc."""
+    """The brake at a wheel. A third dry friction acts on the disc."""
 
     name: ClassVar[str] = "one-box-corner"
     Memory: ClassVar = antilock.Memory
     Stimulus: ClassVar = antilock.Stimulus
-    frictions: ClassVar[tuple[str, ...]] = ("omega", "omega_w")
+    frictions: ClassVar[tuple[str, ...]] = ("omega", "omega_p", "omega_w")
 
     disc = Part(brake_disc)
     turning = Part(
@@ -63,43 +68,49 @@ class OneBoxCorner(Corner[OneBoxCornerParameters, Any], Modulator[OneBoxCornerPa
         w.encoder.u = wheel_encoder.Input(w.turning.x.omega)
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the bounds of the frictions of shaft and disc."""
+        """Return the bounds of the frictions of shaft, pump and disc."""
         rolling = road_wheel.rolling_resistance(w.N_x, w.turning.par)
         most = brake_disc.output(w.disc.u, w.disc.par).torque + rolling
         return (*super().friction(w), (-most, most))
 
     def power(self, w: Self) -> dict[str, float]:
         """Return the powers that do not follow from the parts."""
-        return {**super().power(w), "E_brake": -w.reaction[1] * w.turning.x.omega}
+        return {**super().power(w), "E_brake": -w.reaction[_DISC] * w.turning.x.omega}
 
     def record(self, w: Self) -> dict[str, float]:
         """Return the recorded signals other than states, wires and losses."""
         return {
             **super().record(w),
-            "T_brake": -w.reaction[1],
+            "T_brake": -w.reaction[_DISC],
             "E_wheel": road_wheel.energy(w.turning.x, w.turning.par),
         }
 
     def antilock(self, par: Any) -> tuple[Task, ...]:
         """Return the tasks of anti-lock control or of commanded valves, and the valves' delays."""
         T = par.antilock.T_s
-        law = _sampled if par.antilock.abs == "off" else _controlled
-        return (Task("antilock", T, law), Task("coils", T, _coils))
+        coils = Task("coils", T, _coils)
+        if par.antilock.abs == "off":
+            return (Task("valves", T, _sampled), coils)
+        return (Task("slip", T, _slip), Task("valves", T, _valves), coils)
 
     def rest(self, par: Any) -> tuple[Any, Any]:
         """Return the vehicle at rest with released brakes."""
         return rolling(par, 0.0)
 
 
-def _controlled(x: Any, m: Any, u: Any, par: OneBoxCornerParameters) -> Any:
-    """Read the wheel, and run anti-lock control once."""
+def _slip(x: Any, m: Any, u: Any, par: OneBoxCornerParameters) -> Any:
+    """Read the wheel, and run slip control once."""
     edge = wheel_encoder.reading(
         wheel_encoder.State(x.phi_w), wheel_encoder.Input(x.omega_w), par.antilock.encoder
     )
     weight = par.corner.body.g * road.slope(x.s, par.corner.road).sine
     tread = x.omega_w * par.corner.r
     seen = slip_control.Readings(x.v_x, tread, edge.angle, edge.age, weight, 1.0)
-    return antilock.tick(seen, x.p_mc, m, par)
+    return slip_control.tick(seen, m, par.antilock.slip.k_hat * m.p_ref, par.antilock)
+
+
+def _valves(x: Any, m: Any, u: Any, par: OneBoxCornerParameters) -> Any:
+    return antilock.tick(m, x.p_mc, par)
 
 
 def _sampled(x: Any, m: Any, u: Any, par: OneBoxCornerParameters) -> Any:

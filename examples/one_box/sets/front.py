@@ -82,17 +82,10 @@ NUMBERS = {
     "port.law": chosen("dead-stroke", "the plunger has no port after the first millimeter"),
     "port.x_port": chosen(1 * MM, "usual free travel"),
     "port.G_port": chosen(5e-10, "0.5 bar at 50 mm/s"),
-    "makeup.seat.d": chosen(3 * MM, "lip of the cup seal"),
-    "makeup.seat.C_d": chosen(0.65, "sharp edge"),
-    "makeup.seat.Re_cr": chosen(
-        2000.0, "laminar gap under the lip; also not too stiff for the step"
-    ),
-    "makeup.p_crack": chosen(0.05 * BAR, "soft lip"),
     "stop.k_stop": chosen(5e7, "steel on steel"),
     "stop.tau_stop": chosen(2e-4, "no rebound"),
-    "line.d": chosen(1.2 * MM, "open inlet valves of three wheels together"),
-    "line.C_d": chosen(0.65, "sharp edge"),
-    "line.Re_cr": chosen(500.0, "not too stiff for the step: 0.3 bar"),
+    **_valve("separation", 1.8 * MM, 0.65 * MM, "open"),
+    "separation.seat.Re_cr": chosen(800.0, "not too stiff for the step: 0.4 bar"),
     "others.V_1": chosen(0.63 * CM3, "a second front brake and two rear brakes of 40 % each"),
     "others.p_1": chosen(4 * BAR, "same as the wheel"),
     "others.c": chosen(0.0198 * CM3 / BAR, "a second front brake and two rear brakes of 40 % each"),
@@ -126,6 +119,13 @@ NUMBERS = {
     "ecu.pressure.brakes.V_1": derived(lambda par: par.caliper.V_1 + par.others.V_1, _ASSUMED),
     "ecu.pressure.brakes.p_1": derived(lambda par: par.caliper.p_1, _ASSUMED),
     "ecu.pressure.brakes.c": derived(lambda par: par.caliper.c + par.others.c, _ASSUMED),
+    "ecu.refill.theta_begin": derived(
+        lambda par: 0.9 * par.plunger.x_end / par.gear.k_g, "nine tenths of the travel"
+    ),
+    "ecu.refill.theta_end": derived(
+        lambda par: (par.plunger.x_rest + 1.0 * MM) / par.gear.k_g, "1 mm from the stop"
+    ),
+    "ecu.refill.omega": chosen(40.0, "17 ml/s, of which a leak takes a part"),
     "ecu.position.f_n": chosen(30.0, "three times the pressure loop"),
     "ecu.position.zeta": chosen(1.0, "no overshoot"),
     "ecu.position.c": chosen(1.0, "the speed of the reference is known"),
@@ -248,19 +248,15 @@ CORNER = {
     "antilock.rules.tau_p": chosen(0.023, _SOUGHT),
     "antilock.rules.v_off": chosen(3.5, "the pulses of the encoder are rare below"),
     "antilock.rules.v_fall": chosen(6.0, "same as slip control"),
-    "antilock.valves.K_in": derived(
-        lambda par: orifice.coefficient(par.inlet.seat, par.fluid), _ASSUMED
-    ),
-    "antilock.valves.K_out": derived(
-        lambda par: orifice.coefficient(par.outlet.seat, par.fluid), _ASSUMED
-    ),
-    "antilock.valves.p_cr": chosen(0.1 * BAR, "small compared with a pulse"),
-    "antilock.valves.caliper.V_1": derived(lambda par: par.caliper.V_1, _ASSUMED),
-    "antilock.valves.caliper.p_1": derived(lambda par: par.caliper.p_1, _ASSUMED),
-    "antilock.valves.caliper.c": derived(lambda par: par.caliper.c, _ASSUMED),
-    "antilock.valves.p_low": chosen(2 * BAR, "accumulator with 0.5 cm^3"),
-    "antilock.valves.t_least": chosen(2e-3, "longer than the delay of the valves"),
-    "antilock.valves.q_pump": chosen(3.3 * CM3, "one piston at 3000 rpm"),
+    "valves.K_in": derived(lambda par: orifice.coefficient(par.inlet.seat, par.fluid), _ASSUMED),
+    "valves.K_out": derived(lambda par: orifice.coefficient(par.outlet.seat, par.fluid), _ASSUMED),
+    "valves.p_cr": chosen(0.1 * BAR, "small compared with a pulse"),
+    "valves.caliper.V_1": derived(lambda par: par.caliper.V_1, _ASSUMED),
+    "valves.caliper.p_1": derived(lambda par: par.caliper.p_1, _ASSUMED),
+    "valves.caliper.c": derived(lambda par: par.caliper.c, _ASSUMED),
+    "valves.p_low": chosen(2 * BAR, "accumulator with 0.5 cm^3"),
+    "valves.t_least": chosen(2e-3, "longer than the delay of the valves"),
+    "valves.q_pump": chosen(3.3 * CM3, "one piston at 3000 rpm"),
 }
 SETS = (
     CitedSet(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 import xarray as xr
@@ -44,10 +44,10 @@ class Options(DemandOptions):
 
 def started(par: TruckParameters, v: float) -> tuple[Any, tuple[Any, Any]]:
     """Return the variant that has these parameters, and its start at a speed [m/s]."""
-    if isinstance(par, AbsTruckParameters):
-        return with_abs.TruckAbs(), with_abs.rolling(par, v)
-    if isinstance(par, ParkTruckParameters):
-        return park.TruckPark(), park.rolling(par, v)
+    if hasattr(par, "modulator"):
+        return with_abs.TruckAbs(), with_abs.rolling(cast(AbsTruckParameters, par), v)
+    if hasattr(par, "spring"):
+        return park.TruckPark(), park.rolling(cast(ParkTruckParameters, par), v)
     return model.TruckEbs(), model.rolling(par, v)
 
 

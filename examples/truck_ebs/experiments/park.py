@@ -87,7 +87,7 @@ EXPERIMENT = Experiment(
     assembly="truck-park",
     summary="all air is lost at a service pressure of {p_brake:bar} on a gradient of {gradient:%}",
     options=Options,
-    defaults=Options(gradient=0.18, p_brake=5e5, duration=6.0),
+    defaults=Options(gradient=0.18, p_brake=5e5, duration=20.0),
     cases=cases,
     judge=judge,
     kpis=FIGURES.units,

@@ -46,9 +46,9 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Integral part."""
+    """Integral term."""
 
-    integral: Annotated[float, Signal("Pa", "integral part of the pressure control", 1e4)]
+    integral: Annotated[float, Signal("Pa", "integral term of the pressure control", 1e4)]
 
 
 class Input(NamedTuple):

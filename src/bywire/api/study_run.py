@@ -297,8 +297,8 @@ def _undefined(findings: Findings) -> list[str]:
         if lacking := undefined - len(findings.failures):
             cases.setdefault(lacking, []).append(each.demand.figure)
     return [
-        f"{', '.join(names)}: not defined in {number} of {len(findings.cases)} cases, which count "
-        "as failing the requirement"
+        f"{', '.join(names)}: not defined in {number} of {len(findings.cases)} cases, which "
+        "therefore fail the requirement"
         for number, names in cases.items()
     ]
 

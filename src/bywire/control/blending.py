@@ -9,7 +9,7 @@ from pydantic import Field
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Unit
+from bywire.core.quantities import Duration, TimeConstant, Unit
 from bywire.core.signals import Signal
 
 TorqueRate = Annotated[float, Unit("N*m/s", 5e3), Field(gt=0, allow_inf_nan=False)]
@@ -42,13 +42,16 @@ class Parameters(ParameterSet):
     T_least: LeastTorque
     """friction demand that remains while the pedal brakes, to keep the pads on the disc"""
     t_off: Duration
-    """time in which the motor's command falls to zero while slip control acts"""
+    """time in which the motor's command falls to zero when slip control acts"""
+    t_back: TimeConstant
+    """time after slip control in which the motor does not brake"""
 
 
 class State(NamedTuple):
-    """Command of the motor."""
+    """Command of the motor, and the time until it may brake."""
 
     T_m: Torque
+    wait: Annotated[float, Signal("s", "time until the motor may brake", 0.5)]
 
 
 class Input(NamedTuple):
@@ -99,12 +102,15 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     free = ops.clip(ops.fmin(wanted, u.limit), x.T_m - T * par.rate, x.T_m + T * par.rate)
     # Slip control takes the motor out, because it is slower to modulate than the friction brake.
     out = ops.fmax(x.T_m - T / par.t_off * ops.fmax(u.limit, x.T_m), 0.0)
-    command = ops.where(u.slip > 0.5, out, free)
+    # Slip control often acts several times in a row, and the motor does not return in between.
+    wait = ops.where(u.slip > 0.5, par.t_back, ops.fmax(x.wait - T, 0.0))
+    is_out = ops.where(u.slip > 0.5, 1.0, ops.where(wait > 0.0, 1.0, 0.0))
+    command = ops.where(is_out > 0.5, out, free)
     if par.law == "reported":
         seen = u.T_reported
     elif par.law == "commanded":
         seen = command
     else:
-        seen = ops.where(u.slip > 0.5, command, ops.fmin(wanted, u.limit_ahead))
+        seen = ops.where(is_out > 0.5, command, ops.fmin(wanted, u.limit_ahead))
     friction = u.T_demand if par.category == "A" else ops.fmax(wanted + least - seen, least)
-    return State(T_m=command), Output(T_motor=command, T_friction=friction)
+    return State(T_m=command, wait=wait), Output(T_motor=command, T_friction=friction)

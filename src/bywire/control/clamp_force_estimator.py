@@ -107,7 +107,7 @@ class Parameters(ParameterSet):
     play: AnglePlay
     """minimum motion that determines the direction, above the sensor's resolution"""
     t_rest: Duration
-    """time without such a motion after which the shaft is considered at rest"""
+    """time without such a motion after which the shaft is considered to be at rest"""
     omega_min: Speed
     """speed below which breakaway friction makes the balance uncertain"""
     spread_s: Spread

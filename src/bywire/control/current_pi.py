@@ -29,7 +29,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Integral part."""
+    """Integral term."""
 
     integral: Annotated[float, Signal("1", "integral term", 0.3)]
 

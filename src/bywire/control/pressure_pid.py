@@ -100,7 +100,7 @@ def transferred(
     .. math:: I \leftarrow I + (k_p^{old} - k_p) (b r - p)
 
     The demand at this input then equals the demand with the old gains. Integral and derivative
-    parts are currents, so new k_i and k_d do not change them.
+    terms are currents, so new k_i and k_d do not change them.
 
     Notes
     -----

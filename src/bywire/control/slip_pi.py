@@ -50,7 +50,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Integral part."""
+    """Integral term."""
 
     integral: Pressure
 

@@ -20,6 +20,8 @@ from bywire.core.signals import (
     PressureEnergy,
     Signal,
 )
+from bywire.core.typing import Array
+from bywire.core.validity import first, row_by_row
 
 GaugePressure = Annotated[float, Signal("Pa", "pressure", 2e6), Ge(0)]
 
@@ -60,6 +62,13 @@ FAULTS = (
     ),
     ParameterFault("cold", "thicker fluid", ("nu",), 3.0),
 )
+
+
+@row_by_row
+def watch(t: Array, p: GaugePressure, par: Parameters, place: str) -> list[str]:
+    """Warn if the absolute pressure at a place, such as "in the caliper", is below zero."""
+    text = f"the absolute pressure {place} is below zero"
+    return first(t, p < -par.p_atm, text, ". Real fluid would evaporate, which is not modeled")
 
 
 class Chamber(NamedTuple):

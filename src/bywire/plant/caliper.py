@@ -13,6 +13,8 @@ from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Area, Conductance, Nodes, Stiffness, Unit, Volume
 from bywire.core.signals import Energy, FluidCompliance, Power, Signal
+from bywire.core.typing import Array
+from bywire.core.validity import row_by_row
 from bywire.plant import brake_fluid
 
 Expansion = Annotated[float, Unit("1/K", 7e-4), Field(ge=0, allow_inf_nan=False)]
@@ -194,3 +196,9 @@ def power_loss(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Powe
     if par.leak == "tight":
         return 0.0 * x.p
     return brake_fluid.convected_power(par.G_leak * x.p, x.p, fluid)
+
+
+@row_by_row
+def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
+    """Warn if the absolute pressure is below zero."""
+    return brake_fluid.watch(t, x.p, fluid, "in the caliper")

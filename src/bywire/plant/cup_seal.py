@@ -7,6 +7,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import BreakawayFactor, Damping, Force, Unit
 from bywire.core.signals import Power, Signal
@@ -33,6 +34,11 @@ class Parameters(ParameterSet):
     """characteristic speed of the Stribeck peak"""
     mu: Damping
     """viscous friction per speed"""
+
+
+FAULTS = (
+    ParameterFault("swollen", "increased friction (value: factor)", ("F_pr", "f_p", "f_n"), 1.9),
+)
 
 
 class Input(NamedTuple):

@@ -18,11 +18,12 @@ reciprocity of the cross inductances.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, NamedTuple
 
-import numpy as np
 from annotated_types import Gt
 from pydantic import Field, model_validator
 
@@ -77,16 +78,19 @@ class Parameters(ParameterSet):
     @classmethod
     def fitting(cls, drawn: dict[str, object]) -> dict[str, object]:
         """Return a valid map with the scales of random numbers, for the contracts of elements."""
-        spans = [np.asarray(drawn[name], float) for name in ("i_d", "i_q")]
-        i_d, i_q = (np.linspace(-span[-1], span[-1], span.size) for span in spans)
-        L = np.asarray(drawn["psi_d"], float)[-1] / i_d[-1]
-        d, q = np.meshgrid(i_d, i_q, indexing="ij")
+        spans: list[list[float]] = [list(drawn[name]) for name in ("i_d", "i_q")]  # type: ignore[call-overload]
+        i_d, i_q = (
+            [span[-1] * (2.0 * k / (len(span) - 1) - 1.0) for k in range(len(span))]
+            for span in spans
+        )
+        last: float = list(drawn["psi_d"])[-1]  # type: ignore[call-overload]
+        L = last / i_d[-1]
         bend, cross = 0.1 * L / i_d[-1] ** 2, 0.5 * L / i_q[-1]
-        psi_d = L * d - bend * d**3 - 0.5 * cross * q * q
-        psi_q = 2.0 * L * q - cross * q * d
-        tables = {"psi_d": psi_d, "psi_q": psi_q}
-        nodes = {"i_d": i_d, "i_q": i_q} | tables
-        return {name: tuple(np.ravel(each).tolist()) for name, each in nodes.items()}
+        every = [(d, q) for d in i_d for q in i_q]
+        psi_d = [L * d - bend * d**3 - 0.5 * cross * q * q for d, q in every]
+        psi_q = [2.0 * L * q - cross * q * d for d, q in every]
+        nodes = {"i_d": i_d, "i_q": i_q, "psi_d": psi_d, "psi_q": psi_q}
+        return {name: tuple(each) for name, each in nodes.items()}
 
 
 class Currents(NamedTuple):
@@ -111,7 +115,8 @@ class Inductances(NamedTuple):
     L_qq: SelfInductance
 
 
-class _Basis(NamedTuple):
+@dataclass(frozen=True)
+class _Basis:
     """Polynomials in one cell for value, slope and curvature at each end, and their derivatives."""
 
     value: tuple[float, ...]
@@ -136,40 +141,43 @@ def _listed(nodes: tuple[float, ...], unit: str) -> str:
 
 def _require_equal_cross_slopes(par: Parameters) -> None:
     """Reject maps whose magnetic energy would depend on the path of the currents."""
-    shape = len(par.i_d), len(par.i_q)
-    d, q = np.asarray(par.i_d), np.asarray(par.i_q)
-    psi_d, psi_q = np.reshape(par.psi_d, shape), np.reshape(par.psi_q, shape)
-    along_d, along_q = np.diff(d)[:, None], np.diff(q)[None, :]
-    own_d, own_q = np.diff(psi_d, axis=0) / along_d, np.diff(psi_q, axis=1) / along_q
+    psi_d, psi_q = _tables(par)
+    h_d, h_q = ([b - a for a, b in pairwise(nodes)] for nodes in (par.i_d, par.i_q))
+    own_d = [_secants(column, h_d) for column in _turned(psi_d)]
+    own_q = [_secants(row, h_q) for row in psi_q]
     for name, own in (("psi_d", own_d), ("psi_q", own_q)):
-        if not (own > 0.0).all():
+        least = min(min(each) for each in own)
+        if not least > 0.0:
             raise RuleError(
                 name,
-                f"a table whose slope is {1e3 * own.min():.3g} mH",
+                f"a table whose slope is {1e3 * least:.3g} mH",
                 f"a table that increases with i_{name[-1]}",
             )
     # Mean slopes of each cell. The tables have a potential if they are equal.
-    over_d = np.array([_rises(column, par.i_d) for column in psi_d.T.tolist()]).T
-    over_q = np.array([_rises(row, par.i_q) for row in psi_q.tolist()])
-    of_d, of_q = (each / (along_d * along_q) for each in (np.diff(over_d), np.diff(over_q, axis=0)))
-    allowed = ALLOWED * float(np.sqrt(own_d.mean() * own_q.mean()))
-    apart = np.abs(of_d - of_q)
-    k, n = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    if apart[k, n] > allowed:
+    over_d = [_rises(column, par.i_d) for column in _turned(psi_d)]
+    over_q = [_rises(row, par.i_q) for row in psi_q]
+    means = [sum(map(sum, own)) / (len(own) * len(own[0])) for own in (own_d, own_q)]
+    allowed = ALLOWED * math.sqrt(means[0] * means[1])
+    cells = [(k, n) for k in range(len(h_d)) for n in range(len(h_q))]
+    of_d = {(k, n): (over_d[n + 1][k] - over_d[n][k]) / (h_d[k] * h_q[n]) for k, n in cells}
+    of_q = {(k, n): (over_q[k + 1][n] - over_q[k][n]) / (h_d[k] * h_q[n]) for k, n in cells}
+    k, n = worst = max(cells, key=lambda cell: abs(of_d[cell] - of_q[cell]))
+    if abs(of_d[worst] - of_q[worst]) > allowed:
         raise RuleError(
             "psi_q",
-            f"a table whose slope over i_d is {1e3 * of_q[k, n]:.4g} mH (i_d = {d[k]:g} to "
-            f"{d[k + 1]:g} A, i_q = {q[n]:g} to {q[n + 1]:g} A)",
+            f"a table whose slope over i_d is {1e3 * of_q[worst]:.4g} mH (i_d = {par.i_d[k]:g} to "
+            f"{par.i_d[k + 1]:g} A, i_q = {par.i_q[n]:g} to {par.i_q[n + 1]:g} A)",
             f"within {1e3 * allowed:.3g} mH of the slope of psi_d over i_q, "
-            f"{1e3 * of_d[k, n]:.4g} mH",
+            f"{1e3 * of_d[worst]:.4g} mH",
             "otherwise the magnetic energy depends on the path of the currents",
         )
-    coupled = of_d * of_d
-    inner = (own_d[:, 1:] + own_d[:, :-1]) * (own_q[1:] + own_q[:-1]) / 4.0
-    if not (coupled < inner).all():
+    if any(
+        of_d[k, n] ** 2 >= (own_d[n + 1][k] + own_d[n][k]) * (own_q[k + 1][n] + own_q[k][n]) / 4.0
+        for k, n in cells
+    ):
         raise RuleError(
             "psi_d",
-            f"a table with a cross slope of {1e3 * float(np.abs(of_d).max()):.3g} mH",
+            f"a table with a cross slope of {1e3 * max(map(abs, of_d.values())):.3g} mH",
             "a table whose cross slopes are less than the mean of the own slopes",
             "otherwise the magnetic energy is negative",
         )
@@ -223,10 +231,24 @@ def _turned(rows: Rows) -> Rows:
     return [list(column) for column in zip(*rows, strict=True)]
 
 
+def _secants(values: Sequence[float], widths: Sequence[float]) -> list[float]:
+    return [(b - a) / width for (a, b), width in zip(pairwise(values), widths, strict=True)]
+
+
+def _tables(par: Parameters) -> tuple[Rows, Rows]:
+    """Return the tables of psi_d and psi_q, with a row for each i_d."""
+    n = len(par.i_q)
+    psi_d, psi_q = (
+        [list(table[k : k + n]) for k in range(0, len(table), n)]
+        for table in (par.psi_d, par.psi_q)
+    )
+    return psi_d, psi_q
+
+
 def _slopes(values: Sequence[float], nodes: Sequence[float]) -> list[float]:
     """Return the slopes at the nodes, of a parabola through three nodes."""
     h = [b - a for a, b in pairwise(nodes)]
-    secants = [(b - a) / width for (a, b), width in zip(pairwise(values), h, strict=True)]
+    secants = _secants(values, h)
     if len(h) == 1:
         return [secants[0], secants[0]]
     inner = [
@@ -260,10 +282,7 @@ def _derivatives(par: Parameters) -> tuple[tuple[Rows, Rows, Rows], ...]:
     The coenergy is the mean of the integrals along both edges of the tables.
     """
     d, q, n = par.i_d, par.i_q, len(par.i_q)
-    psi_d, psi_q = (
-        [list(table[k : k + n]) for k in range(0, len(table), n)]
-        for table in (par.psi_d, par.psi_q)
-    )
+    psi_d, psi_q = _tables(par)
     over_q = [_sums(_rises(row, q)) for row in psi_q]
     over_d = [_sums(_rises(column, d)) for column in _turned(psi_d)]
     W = [
@@ -287,7 +306,8 @@ def _derivatives(par: Parameters) -> tuple[tuple[Rows, Rows, Rows], ...]:
     )
 
 
-class _Patch(NamedTuple):
+@dataclass(frozen=True)
+class _Patch:
     """The cell that contains the currents: its 36 coefficients, and the polynomials in it."""
 
     coefficients: tuple[tuple[float, ...], ...]

@@ -15,6 +15,7 @@ from bywire.core.signals import Power, Signal, Torque
 
 FlankAngle = Annotated[float, Unit("rad", 0.25), Field(ge=0, lt=1.2, allow_inf_nan=False)]
 Friction = Annotated[float, Unit("1", 0.1), Field(ge=0, lt=1, allow_inf_nan=False)]
+ClampForce = Annotated[float, Signal("N", "clamp force", 1e4)]
 
 
 class Parameters(ParameterSet):
@@ -120,6 +121,22 @@ def friction(u: Input, par: Parameters) -> Output:
         T_p=ops.where(load < 0, opposing, aiding),
         T_n=ops.where(load > 0, opposing, aiding),
     )
+
+
+def release_torque(F: ClampForce, par: Parameters) -> Torque:
+    r"""Return the torque that releases a clamp force, > 0 if the screw is self-locking.
+
+    .. math:: T = F \frac{d_m}{2} \tan(\rho - \lambda)
+    """
+    return -efficiencies(par).eta_b * slope(par) * F
+
+
+def apply_torque(F: ClampForce, par: Parameters) -> Torque:
+    r"""Return the torque that applies a clamp force.
+
+    .. math:: T = F \frac{d_m}{2} \tan(\rho + \lambda)
+    """
+    return slope(par) * F / efficiencies(par).eta_f
 
 
 def power_loss(u: Input, par: Parameters) -> Power:

@@ -10,7 +10,9 @@ from pydantic import model_validator
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Area, Damping, Length
 from bywire.core.signals import Energy, FluidCompliance, Power, Role, Signal
+from bywire.core.typing import Array
 from bywire.core.units import shown
+from bywire.core.validity import row_by_row
 from bywire.plant import brake_fluid
 
 Loss = Annotated[float, Signal("W", "fluid damping loss", role=Role("sink", "fluid damping"))]
@@ -122,3 +124,9 @@ def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters)
 def power_loss(u: Input, par: Parameters) -> Loss:
     """Return the heat from the damping force, >= 0."""
     return par.k_damp * u.v * u.v
+
+
+@row_by_row
+def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
+    """Warn if the absolute pressure is below zero."""
+    return brake_fluid.watch(t, x.p, fluid, "in the master cylinder")

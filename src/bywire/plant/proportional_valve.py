@@ -31,6 +31,8 @@ from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Unit
 from bywire.core.signals import Energy, Power, Pressure, Role, Signal
+from bywire.core.typing import Array
+from bywire.core.validity import first, outside, row_by_row
 from bywire.plant import brake_fluid, orifice
 
 HalfAngle = Annotated[float, Unit("rad", 0.8), Field(gt=0, le=math.pi / 2, allow_inf_nan=False)]
@@ -198,3 +200,11 @@ def power_loss(x: State, par: Parameters) -> Loss:
 def throttling(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> orifice.Loss:
     """Return the heat from the flow through the seat, >= 0."""
     return orifice.power_loss(_through(x, u, par), par.seat, fluid)
+
+
+@row_by_row
+def watch(t: Array, x: State, par: Parameters) -> list[str]:
+    """Warn if seat or stop are missing or too soft."""
+    beyond = outside(x.x, -0.5 * par.lift, 1.5 * par.lift)
+    after = ". Connect an end_stop from 0 to lift, or make it stiffer"
+    return first(t, beyond, "the needle passes its seat or its stop", after)

@@ -24,7 +24,7 @@ from bywire.core.quantities import Conductance, Length, Unit, Volume
 from bywire.core.signals import Energy, Power, Pressure, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.core.validity import first, highest, row_by_row
+from bywire.core.validity import highest, row_by_row
 from bywire.plant import brake_fluid, check_valve
 
 Phase = Annotated[float, Unit("rad", 1.0), Field(allow_inf_nan=False)]
@@ -32,8 +32,8 @@ ClosingTime = Annotated[float, Unit("s", 5e-5), Field(gt=0, allow_inf_nan=False)
 PumpPressure = Annotated[float, Unit("Pa", 2.5e7), Field(gt=0, allow_inf_nan=False)]
 Flow = Annotated[float, Signal("m**3/s", "flow", 1e-5)]
 Loss = Annotated[float, Signal("W", "loss in the return pump", role=Role("sink", "return pump"))]
-DEAD_BAND = 1e-4
-"""share of the displacement below which a void does not count, larger than the step's errors"""
+ROUNDING = 2e-2
+"""share of the displacement over which a void begins smoothly, larger than the step's errors"""
 
 
 NOTHING = 1e-12
@@ -99,11 +99,12 @@ class InputRate(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Flows, load of the shaft, and void."""
+    """Flows, load of the shaft, its set-valued part, and void."""
 
     q_s: Annotated[float, Signal("m**3/s", "flow into the pump", 1e-5)]
     q_d: Annotated[float, Signal("m**3/s", "flow out of the pump", 1e-5)]
-    torque: Annotated[float, Signal("N*m", "load of the pump", 0.1)]
+    torque: Annotated[float, Signal("N*m", "mean load of the pump", 0.1)]
+    friction: Annotated[float, Signal("N*m", "set-valued load of the pump", 0.1)]
     void: Annotated[float, Signal("m**3", "void in the pump", 3e-8)]
 
 
@@ -117,15 +118,22 @@ def displacement(par: Parameters) -> Annotated[float, Signal("m**3", "volume", 7
     return 2.0 * area(par) * par.e
 
 
-def void(
-    x: State, u: Input, par: Parameters
-) -> Annotated[float, Signal("m**3", "void in the pump", 3e-8)]:
-    r"""Return the volume without fluid, :math:`V_{void} = \max(A_p e \cos\varphi - V, 0)`.
+class Void(NamedTuple):
+    """Volume without fluid, and its derivative by the volume of the chamber."""
 
-    A void below 1e-4 of the displacement does not count.
+    V: Annotated[float, Signal("m**3", "void in the pump", 3e-8)]
+    slope: Annotated[float, Signal("1", "slope of the void", 1.0)]
+
+
+def void(x: State, u: Input, par: Parameters) -> Void:
+    r"""Return the volume that fluid does not fill, :math:`\max(A_p e \cos\varphi - V, 0)`.
+
+    The corner is rounded over 2 % of the displacement.
     """
+    width = ROUNDING * displacement(par)
     empty = area(par) * par.e * ops.cos(u.theta + par.phase) - x.V
-    return ops.fmax(empty - DEAD_BAND * displacement(par), 0.0)
+    inside = ops.clip(empty, 0.0, width)
+    return Void(V=inside / width * (empty - 0.5 * inside), slope=inside / width)
 
 
 def growth(u: Input, par: Parameters) -> Flow:
@@ -158,7 +166,7 @@ class _Flows(NamedTuple):
 
 def _flows(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> _Flows:
     most = check_valve.flow(check_valve.Input(u.p_s, -1.0 * fluid.p_atm), par.suction, fluid)
-    through = growth(u, par) + void(x, u, par) / par.tau
+    through = growth(u, par) + void(x, u, par).V / par.tau
     return _Flows(
         suction=ops.fmin(ops.fmax(through, 0.0), most), delivery=ops.fmax(-1.0 * through, 0.0)
     )
@@ -172,20 +180,25 @@ def output(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -
         y = \dot V_c + V_{void}/\tau
 
     with the growth of the chamber and the largest flow into vacuum,
-    :math:`q_{most} = q_{check}(p_s, -p_{atm})`. The flow back (`returned`) reduces both flows. The
-    piston carries the pressure of the open valve, or vacuum:
+    :math:`q_{most} = q_{check}(p_s, -p_{atm})`. The flow back (`returned`) reduces both flows.
 
-    .. math:: T = A_p e \sin\varphi\, (p + (1 - \sigma)(-p_{atm} - p)), \quad
-        \sigma = \frac{\tau |\dot V_c|}{\tau |\dot V_c| + V_{void}}
+    While the chamber shrinks, the piston carries the flow energy (`brake_fluid.flow_energy`) of
+    :math:`p_d` plus the pressure drop of the valve, and while it grows, that of :math:`p_s` minus
+    the pressure drop. Half the sum of both pressures, :math:`p_\Sigma`, is a load that does not
+    depend on the direction. Half the difference, :math:`p_\Delta`, always opposes the motion:
 
-    with the flow energies (`brake_fluid.flow_energy`) of :math:`p_d` plus the valve's pressure drop
-    while the chamber shrinks, and of :math:`p_s` minus the pressure drop while it grows.
+    .. math:: T = A_p e\, p_\Sigma \sin\varphi, \quad F = A_p e\, p_\Delta |\sin\varphi|
+
+    Declare F as a friction on the shaft, with the bounds :math:`\pm F`. At rest, both valves are
+    closed, and the chamber's pressure has any value between the two. A void reduces both pressures
+    toward vacuum, :math:`p \to p - (1 - \sigma)(p + p_{atm})`, with
+    :math:`\sigma = \tau |\dot V_c| / (\tau |\dot V_c| + V_{void})`.
 
     Notes
     -----
-    The flows have kinks where a valve opens, where suction reaches its largest flow, and where a
-    void closes. The load has kinks at the dead centers. The chamber's pressure is undefined while
-    the shaft rests.
+    The flows have kinks where a valve opens, and where suction reaches its largest flow. The load
+    has kinks at the dead centers. If the suction pressure exceeds the delivery pressure, fluid
+    could flow through a resting pump. Use another `check_valve` for this.
     """
     s, flows = growth(u, par), _flows(x, u, par, fluid)
     vacuum, h = -1.0 * fluid.p_atm, brake_fluid.flow_energy
@@ -193,15 +206,19 @@ def output(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -
     before = h(u.p_s, fluid) - check_valve.pressure_drop(flows.suction, par.suction, fluid)
     behind = h(u.p_d, fluid) + check_valve.pressure_drop(flows.delivery, par.delivery, fluid)
     swept = par.tau * ops.fabs(s)
-    solid = swept / ops.fmax(swept + empty, NOTHING * displacement(par))
-    above = ops.where(s > 0.0, ops.fmax(before - vacuum, 0.0), behind - vacuum)
+    solid = swept / ops.fmax(swept + empty.V, NOTHING * displacement(par))
+    grown = (1.0 - solid) * empty.slope
+    before = ops.fmax(before, vacuum)
+    before = before + grown * (vacuum - before)
+    behind = behind + grown * (vacuum - behind)
     arm = area(par) * par.e * ops.sin(u.theta + par.phase)
     back = returned(u, par, fluid)
     return Output(
         q_s=flows.suction - back,
         q_d=flows.delivery - back,
-        torque=arm * (vacuum + solid * above),
-        void=empty,
+        torque=0.5 * arm * (behind + before),
+        friction=0.5 * ops.fabs(arm) * ops.fmax(behind - before, 0.0),
+        void=empty.V,
     )
 
 
@@ -223,27 +240,39 @@ def input_rate(u: Input) -> InputRate:
 
 def energy(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
     """Return the work of the void against ambient pressure."""
-    return fluid.p_atm * void(x, u, par)
+    return fluid.p_atm * void(x, u, par).V
+
+
+def shaft_power(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
+    """Return the power of the shaft, including that against the set-valued load."""
+    y = output(x, u, par, fluid)
+    return y.torque * u.omega + y.friction * ops.fabs(u.omega)
 
 
 def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
     """Return the power of shaft and inflow, minus that of the outflow."""
     y, convected = output(x, u, par, fluid), brake_fluid.convected_power
-    return y.torque * u.omega + convected(y.q_s, u.p_s, fluid) - convected(y.q_d, u.p_d, fluid)
+    flows = convected(y.q_s, u.p_s, fluid) - convected(y.q_d, u.p_d, fluid)
+    return shaft_power(x, u, par, fluid) + flows
 
 
 def power_loss(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Loss:
-    """Return the heat from valves, returned flow and closing voids, >= 0."""
+    """Return the heat from valves, returned flow and closing voids, >= 0.
+
+    Notes
+    -----
+    It contains the power of the set-valued load, F |omega|. In an assembly, the actual power is
+    that of the reaction on the shaft. To balance the energy exactly, add the difference,
+    ``-reaction * omega - F * |omega|``, to the loss of the part.
+    """
     opens = growth(u, par) - balance(x, u, par, fluid)
-    stored = ops.where(void(x, u, par) > 0.0, fluid.p_atm * opens, 0.0 * opens)
-    return power_in(x, u, par, fluid) - stored
+    return power_in(x, u, par, fluid) - fluid.p_atm * void(x, u, par).slope * opens
 
 
 @row_by_row
 def watch(t: Array, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> list[str]:
     """Warn if the delivery pressure exceeds the permitted one, or suction is below vacuum."""
-    below = "the absolute pressure at the pump's suction is below zero"
-    texts = first(t, u.p_s < -fluid.p_atm, below)
+    texts = brake_fluid.watch(t, u.p_s, fluid, "at the pump's suction")
     p = highest(u.p_d)
     if p > par.p_max:
         limit = shown(par.p_max, "Pa")

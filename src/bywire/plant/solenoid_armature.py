@@ -265,6 +265,9 @@ def throttling(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameter
 
 @row_by_row
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
-    """Warn if the armature reaches the iron, because its stop is too soft."""
-    closed = x.x >= par.g_0
-    return first(t, closed, "the armature closes its air gap", ": use a stiffer end stop")
+    """Warn if seat or stop are missing or too soft."""
+    after = ". Connect an end_stop from travel_ends.near to .far, or make it stiffer"
+    return [
+        *first(t, x.x <= -0.5 * par.travel, "the armature leaves its near end", after),
+        *first(t, x.x >= par.g_0, "the armature closes its air gap", after),
+    ]

@@ -14,7 +14,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Pressure, Unit, Volume
 from bywire.core.signals import Energy, FluidCompliance, Power, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import first, row_by_row
+from bywire.core.validity import row_by_row
 from bywire.plant import brake_fluid
 
 Compliance = Annotated[float, Unit("m**3/Pa", 1e-13), Field(gt=0, allow_inf_nan=False)]
@@ -91,4 +91,4 @@ def power_in(x: State, u: Input, fluid: brake_fluid.Parameters) -> Power:
 @row_by_row
 def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
     """Warn if the absolute pressure is below zero."""
-    return first(t, x.p < -fluid.p_atm, "the absolute pressure in the caliper is below zero")
+    return brake_fluid.watch(t, x.p, fluid, "in the caliper")

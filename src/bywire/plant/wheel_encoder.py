@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
     pulses: Annotated[float, Unit("1", 48.0), Field(ge=1, allow_inf_nan=False)]
     """pulses per revolution"""
     omega_min: Annotated[float, Unit("rad/s", 0.1), Field(gt=0, allow_inf_nan=False)]
-    """minimum speed at which time stamps of edges are correct"""
+    """minimum speed at which the time stamps of edges are valid"""
 
 
 class State(NamedTuple):

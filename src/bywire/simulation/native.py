@@ -80,7 +80,7 @@ class Inputs:
     def of(cls, rows_of: Callable[[int], Array], cases: int, lanes: int) -> Inputs:
         """Return the stimulus of some cases; idle lanes repeat the last case.
 
-        ``rows_of(case)``: its stimulus, shape (nu, rows), computed anew for each call.
+        ``rows_of(case)``: its stimulus, shape (nu, rows), computed again for each call.
         """
         first = rows_of(0)
         bits = first.view(np.int64)

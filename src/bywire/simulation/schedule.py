@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -20,6 +20,7 @@ _MOST = 2**53  # maximum number of substeps in an interval or a run, which float
 _FRAME = (
     100_000  # maximum number of substeps in a frame, because interrupts are checked between frames
 )
+_SHORTER = 100  # a proposed step is at most this many times shorter than the rejected one
 _TRIALS = 10_000  # number of divisors to try in the search for one with few digits
 
 
@@ -112,8 +113,9 @@ def _planned(
         raise not_valid("step", f"{step:g} s", "> 0 s", "usually 20 us", StepError)
     if not (math.isfinite(duration) and duration > 0):
         raise not_valid("duration", f"{duration:g} s", "> 0 s", kind=StepError)
-    counts = {name: _whole(period, step, name) for name, period in periods}
-    recorded = _whole(record, step, "recording")
+    intervals = (*(period for _, period in periods), record)
+    counts = {name: _whole(period, step, name, intervals) for name, period in periods}
+    recorded = _whole(record, step, "recording", intervals)
     frame = _divided(math.gcd(recorded, *counts.values()))
     rows = math.ceil(duration / record - _TOLERANCE)
     return Schedule(
@@ -144,7 +146,7 @@ def _require_few(name: str, length: float, step: float) -> None:
         )
 
 
-def _whole(period: float, step: float, name: str) -> int:
+def _whole(period: float, step: float, name: str, intervals: Sequence[float]) -> int:
     _require_few(name, period, step)
     count = round(period / step)
     rest = abs(count * step - period)
@@ -153,15 +155,27 @@ def _whole(period: float, step: float, name: str) -> int:
         # The error uses the unit in which the user wrote the step or the interval.
         texts = (getattr(each, "text", "") for each in (step, period))
         unit = next(filter(None, (written_unit(text, "s") for text in texts)), "")
-        value, valid = shown(step, "s", unit), shown(_divisor(period, step), "s", unit, digits=15)
+        value = shown(step, "s", unit)
+        valid = shown(_proposed(period, step, intervals), "s", unit, digits=15)
         raise StepError(
             f"step = {value} does not divide the {name} interval of "
-            f"{shown(period, 's', unit, digits=12)}. For example, use {valid}",
+            f"{shown(period, 's', unit, digits=12)}. For example, use {valid}, or an interval "
+            f"that is a multiple of {value}",
             name="step",
             value=value,
             valid=valid,
         )
     return count
+
+
+def _proposed(period: float, step: float, intervals: Sequence[float]) -> float:
+    """Return a step [s] that divides all intervals of a run, or only one if it would be tiny."""
+    whole = [Fraction(f"{each:.15g}") * 10**9 for each in intervals]
+    if all(each.denominator == 1 for each in whole):
+        common = _divisor(math.gcd(*(int(each) for each in whole)) / 1e9, step)
+        if common * _SHORTER >= step:
+            return common
+    return _divisor(period, step)
 
 
 def _divisor(period: float, step: float) -> float:

@@ -71,6 +71,7 @@ class Law(NamedTuple):
     T_limit: Annotated[float, Signal("N*m", "limit of the motor torque", 300.0)]
     T_friction: Annotated[float, Signal("N*m", "demand that is sent to the brake", 300.0)]
     T_brake: Annotated[float, Signal("N*m", "demand that arrives at the brake", 300.0)]
+    t_wait: Annotated[float, Signal("s", "time until the motor may brake after slip control", 0.5)]
     a_m_hat: Annotated[float, Signal("m/s**2", "deceleration seen by the blending law", 5.0)]
     v_m_last: Annotated[float, Signal("m/s", "wheel speed at the last tick of blending", 20.0)]
 
@@ -122,10 +123,11 @@ def tick(seen: Readings, m: Any, par: Parameters) -> Any:
     now, then = (wheel_motor.limit(each / seen.r, each, P_bat, par.motor) for each in (v, ahead))
     m, reported = _transmitted("report", seen.T_m, m, par)
     u = blending.Input(seen.T_demand, seen.T_coast, now, then, reported, seen.slip_acts)
-    state, out = blending.output(blending.State(m.T_m_ref), u, T, par.blending)
+    state, out = blending.output(blending.State(m.T_m_ref, m.t_wait), u, T, par.blending)
     m, received = _transmitted("sent", out.T_friction, m, par)
     return m._replace(
         T_m_ref=state.T_m,
+        t_wait=state.wait,
         T_limit=now,
         T_friction=out.T_friction,
         T_brake=received,

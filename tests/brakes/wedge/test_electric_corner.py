@@ -53,7 +53,8 @@ def test_slip_control_takes_the_motor_out_within_50_ms():
     result = stop(**panic, options__duration="6 s")
     run = result.recording
     t = run["time"].values
-    first = int(np.argmax(run["abs"].values > 0.5))
+    first = int(np.argmax(run["T_m_ref"].values[1:] < run["T_m_ref"].values[:-1] - 1.0))
+    assert float(run["abs"][first]) == 1.0
     assert float(run["T_m"][first]) > 200.0
     after = run.sel(time=slice(t[first] + 0.051, None))
     assert float(np.abs(after["T_m_ref"]).max()) == 0.0

@@ -151,3 +151,20 @@ def test_screw_that_holds_is_allowed_and_said(eta_b):
     )
     kept = run["M_B"][-1] / run["M_B"][run.time < 0.8][-1]
     assert (kept > 0.98) == (eta_b == 0.0)
+
+
+def test_screw_that_the_motors_cannot_release_is_reported():
+    """The release takes -eta_b F L / 2 pi, and the motors have 0.1 N*m/A."""
+    held, stuck = (warnings("power-off-hold", screw__eta_b=eta)[-1] for eta in (-1.0, -10.0))
+    locked = "no load can drive these screws back"
+    assert held == f"screw.eta_b = -1: {locked}, so the brake keeps its moment after power-off"
+    found = re.fullmatch(
+        rf"screw.eta_b = -10: {locked}, and the motors cannot release them from ([\d.]+) kN. This "
+        r"takes ([\d.]+) N[*]m, but the current limit of 20 A allows 2 N[*]m. Use screw.eta_b >= "
+        r"(-[\d.]+)",
+        stuck,
+    )
+    assert found is not None, stuck
+    force, torque, least = map(float, found.groups())
+    assert torque == pytest.approx(10e3 * force * 2e-3 / (2.0 * np.pi), rel=5e-3)
+    assert least == pytest.approx(-20.0 / torque, rel=0.06)  # of two digits

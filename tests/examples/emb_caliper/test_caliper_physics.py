@@ -114,7 +114,10 @@ def test_travel_per_angle_is_what_is_passed_on(emb: Any, par: Any) -> None:
         ({"friction.T_s": 0.01}, "T_s = 0.01 N*m must be >= C = 0.0304 N*m"),
         ({"caliper.n_max": 3.2e-3}, "must increase up to n_max"),
         ({"stop.x_end": 1e-3}, "stop.x_end = 0.001 m must be >"),
-        ({"ecu.T_current": 3e-4}, "whole multiple"),
+        (
+            {"ecu.T_current": 3e-4},
+            "T_current = 0.3 ms must divide T_force = 1 ms. For example, use T_current = 0.1 ms",
+        ),
         ({"caliper.clearance": -1e-4}, "caliper.clearance"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from bywire.brakes.wedge.laws.moment_control import MOMENT
 from bywire.core.parameters import ParameterSet
+from bywire.core.units import shown
 
 Rows = NDArray[np.bool_]
 
@@ -28,7 +30,7 @@ def warnings_of(recording: xr.Dataset, par: ParameterSet) -> list[str]:
     if values["command.mode"] == "moment":  # in other modes the test demands the currents
         warnings += _out_of_reach(recording, values) or _not_reached(recording, values)
         warnings += _limits(recording, values)
-    return warnings + _holding_screw(values)
+    return warnings + _holding_screw(recording, values)
 
 
 def _end_stop(recording: xr.Dataset) -> list[str]:
@@ -142,10 +144,20 @@ def _longest(rows: Rows) -> tuple[int, int]:
     return int(begins[k]), int(ends[k])
 
 
-def _holding_screw(values: Mapping[str, Any]) -> list[str]:
-    if values["screw.law"] != "load" or values["screw.eta_b"] != 0.0:
+def _holding_screw(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the screws lock themselves, and that the motors cannot release them."""
+    eta_b = values["screw.eta_b"]
+    if values["screw.law"] != "load" or eta_b > 0.0:
         return []
-    return [
-        "screw.eta_b = 0: no load can drive these screws back, so the brake keeps its moment "
-        "after power-off"
-    ]
+    locked = f"screw.eta_b = {eta_b:g}: no load can drive these screws back"
+    force = max(float(np.abs(recording[name].values).max()) for name in ("f_1", "f_2"))
+    needed = -eta_b * force * values["screw.lead"] / (2.0 * math.pi)
+    most = _limit(values) * min(values["motor_1.K_ref"], values["motor_2.K_ref"])
+    if needed > most:
+        load = shown(force, "N", digits=3)
+        return [
+            f"{locked}, and the motors cannot release them from {load}. This takes {needed:.3g} "
+            f"N*m, but the current limit of {_limit(values):.4g} A allows {most:.3g} "
+            f"N*m. Use screw.eta_b >= {-most / needed * abs(eta_b):.2g}"
+        ]
+    return [f"{locked}, so the brake keeps its moment after power-off"]

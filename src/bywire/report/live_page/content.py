@@ -77,8 +77,8 @@ class Dependence:
 def dependence(bench: Bench, number: int, names: Collection[str]) -> Dependence:
     """Return the dependencies on a bench's parameters in one of its runs.
 
-    Each parameter changes by a thousandth, up or else down. A parameter that allows neither counts
-    as driving.
+    Each parameter changes by a thousandth, up or else down. A parameter that allows neither is
+    treated as driving.
     """
     case, values = _case(bench, number), bench.par.leaves()
     driving, judging = set(), set()

@@ -70,7 +70,7 @@ class Options(ParameterSet):
     mu_B: Coefficients
     """pad friction coefficients"""
     slope: Literal["known", "fixed"]
-    """whether the controller uses the correct friction coefficient"""
+    """whether the controller uses the true friction coefficient"""
     friction: Literal["kept", "none"]
     """whether the brake has dry friction"""
     settle: Duration

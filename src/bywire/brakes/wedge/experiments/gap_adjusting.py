@@ -41,7 +41,7 @@ class Options(ParameterSet):
     M_brake: SomeMoment
     """moment of each application"""
     more: Growth
-    """excess clearance from wear; the contact angle in the brake's memory is correct"""
+    """excess clearance due to wear; the brake's stored contact angle is correct"""
     applications: Count
     """number of applications"""
     t_hold: Duration

@@ -55,7 +55,7 @@ class Options(ParameterSet):
     J_added: Inertia
     """inertia added to the shaft in the second run"""
     i_brake: Current
-    """braking current in the third run; at rest, friction must hold its torque"""
+    """braking current in the third run; friction must hold this current's torque at rest"""
     duration: Duration
     """recording time after the end of the spin-up"""
     record: Duration

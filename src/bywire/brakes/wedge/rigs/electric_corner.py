@@ -14,11 +14,14 @@ from pydantic import model_validator
 from bywire.brakes.wedge import control
 from bywire.brakes.wedge.rigs import wedge_corner
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner, WedgeCornerParameters
+from bywire.core import ops
 from bywire.core.model import Task
 from bywire.core.parameters import RuleError
 from bywire.core.signals import Signal, joined
 from bywire.vehicle import regeneration
 from bywire.vehicle.regeneration import RegeneratingCorner
+
+_CLEARLY = 0.9
 
 
 class ElectricCornerParameters(WedgeCornerParameters):
@@ -71,9 +74,11 @@ class ElectricCorner(RegeneratingCorner[ElectricCornerParameters, Any], WedgeCor
     )
 
     def slip_acts(self, m: Any) -> float:
-        """Return whether slip control acts."""
-        acts: float = m.abs
-        return acts
+        """Return whether slip control lowers the demand by more than a tenth.
+
+        At low speed, noise of the estimated slip lowers it by less for single samples.
+        """
+        return ops.where(m.M_left < _CLEARLY * m.M_most, 1.0, 0.0)
 
     def demands(self, m: Any, u: Any, par: ElectricCornerParameters) -> tuple[float, float]:
         """Return the demands of the pedal after slip control, and of the accelerator."""

@@ -374,7 +374,7 @@ class Options(ParameterSet):
     counted: Literal["build-up-and-hold", "whole-pulse"]
     """whether the peak power includes the release"""
     omega_gap: SpeedLimit
-    """maximum speed while crossing the gap with the given drive train, scaled like all speeds"""
+    """maximum speed while crossing the gap with the given drive train; scales with all speeds"""
     mu_B: Coefficients
     """pad friction coefficients; the worst case determines the result"""
     believed: Literal["known", "as-given"]

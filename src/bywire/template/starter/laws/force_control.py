@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Integral part of the speed control."""
+    """Integral term of the speed control."""
 
     v_i: Annotated[float, Signal("V", "integral term", 1.0)]
 
