@@ -338,7 +338,7 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "G": 60 * BAR,
     },
     "rack": {"r_p": 15 * MM, "eta": 0.9},
-    "seal_rollback": {"k": 6e5, "z_max": 0.3 * MM},
+    "seal_rollback": {"k": 6e5, "z_max": 0.06 * MM},
     "solenoid_armature": {
         **_SEAT,
         "unpowered": "closed",

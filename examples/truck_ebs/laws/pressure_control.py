@@ -42,7 +42,7 @@ class Parameters(ParameterSet):
     p_wait: Pressure
     """error above which the integral waits, because the valve is fully open"""
     p_trim: Pressure
-    """largest integral part"""
+    """largest integral term"""
 
 
 class State(NamedTuple):
