@@ -88,12 +88,12 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     off = int(np.argmax(mode == HOLDS))
     rested = int(np.searchsorted(time, time[off] + 0.5))
     steady = F[parked & (time >= time[rested])]
-    travel = run["travel"].values[rested:][: round(10.0 / RECORD)]
+    after = parked & (time >= time[rested]) & (time <= time[rested] + 10.0)
     values = {
         "time_to_park": time[off],
         "first_force": F[rested],
         "least_force": steady.min(),
-        "creep": np.ptp(travel),
+        "creep": np.ptp(run["travel"].values[after]),
         "clamped_again": run["clamped"].values[parked][-1],
         "residual_force": F[-1],
         "energy": run["E_source"].values[-1],
