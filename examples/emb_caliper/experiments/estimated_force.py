@@ -100,7 +100,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     }
     rms = {name: float(np.sqrt(np.mean(e * e))) for name, e in errors.items()}
     size = np.abs(errors["estimate"])
-    of_full = "in per cent of full scale."
+    of_full = "in % of full scale."
     return (
         Kpi("rms_error", rms["estimate"], "%", f"RMS error of the estimate, {of_full}"),
         Kpi("error_99", float(np.quantile(size, 0.99)), "%", f"99 % of errors, {of_full}"),

@@ -80,7 +80,7 @@ def row(caliper: Path) -> Row:
 def test_wrong_properties_cost_accuracy(
     name: str, wrong: Any, fused: float, balance: float | None, row: Row
 ) -> None:
-    """The values are those of an independent simulation, in per cent of full scale."""
+    """The values are those of an independent simulation, in % of full scale."""
     figures = row(name, UNTRAINED, wrong)
     assert figures["rms_error"] <= 1.2 * fused
     if balance is not None:

@@ -20,7 +20,9 @@ NAMES = ("parking-screw", "parking-pawl")
 @pytest.fixture(scope="module")
 def runs(caliper: Path) -> dict[str, Any]:
     """Return a run of each brake on a hot disc."""
-    return {name: toolkit.run(toolkit.Bench("park", name, {}, {"hold": 400.0})) for name in NAMES}
+    return {
+        name: toolkit.run(toolkit.Bench("park-hot", name, {}, {"hold": 400.0})) for name in NAMES
+    }
 
 
 def figures(result: Any) -> dict[str, float]:
@@ -123,7 +125,7 @@ def test_a_brake_that_cannot_release_or_hold_is_rejected(
     caliper: Path, name: str, changes: dict[str, Any], field: str, valid: str
 ) -> None:
     with raises(ParameterError, name=field, valid=valid):
-        toolkit.run(toolkit.Bench("park", name, changes))
+        toolkit.run(toolkit.Bench("park-hot", name, changes))
 
 
 def test_torques_of_the_specified_screw(caliper: Path) -> None:

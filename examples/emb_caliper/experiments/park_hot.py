@@ -1,4 +1,4 @@
-"""Park: clamp a hot disc, hold it without current while it cools, clamp again, and release."""
+"""Park hot: clamp a hot disc, hold it without current while it cools, clamp again, and release."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 
 
 EXPERIMENT = Experiment(
-    name="park",
+    name="park-hot",
     assembly="emb-parking",
     summary="parking on a disc of {T_disc:degC}, which cools for {hold}",
     options=Options,
