@@ -12,11 +12,12 @@ from typing import Any
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
 
-from fault_rows import motorcycle, wedge  # noqa: E402
+from fault_rows import motorcycle, regeneration, wedge  # noqa: E402
 
 TABLES: dict[str, tuple[Any, ...]] = {
     "The motorcycle brake": motorcycle.ROWS,
     "The wedge brake": wedge.ROWS,
+    "The wedge brake with a motor at the wheel": regeneration.ROWS,
 }
 HEAD = """# Faults: reference values and computed values
 

@@ -170,6 +170,10 @@ FIGURES: dict[str, Declared] = {
     ),
     "pad_hysteresis": Course("output.F_hysteresis", 3.5, {"u.v": _strokes}, "u.v"),
     "pad_wear": Curve("wear_per_work", "T", (300.0, 900.0)),
+    "parking_cable": Curve(
+        "output.F_p", "u.tension", (0.0, 1000.0), {}, ("par.phi", (1.0, 3.0, 6.0))
+    ),
+    "pawl_lock": Curve("release_force", "torque", (0.0, 0.4), {}, ("par.mu", (0.1, 0.15, 0.2))),
     "pedal": Curve("output.x", "u.force", (0.0, 100.0)),
     "pedal_simulator": Curve("spring_force", "u.x", (-2 * MM, 20 * MM)),
     "pipeline": Curve("output.q", "u.p_a", (-10 * BAR, 10 * BAR)),
@@ -231,6 +235,9 @@ FIGURES: dict[str, Declared] = {
     "stiffening_caliper": Curve("volume", "x.p", (0.0, 100 * BAR)),
     "tandem_master_cylinder": Curve(
         "output.F_spring_1", "x.x_1", (10 * MM, 28 * MM), {}, ("x.x_2", (0.0, 5 * MM, 10 * MM))
+    ),
+    "thermal_growth": Course(
+        "output.growth", 1800.0, {"x.T": 573.15}, lines=("par.tau", (300.0, 600.0, 1200.0))
     ),
     "traction_battery": Curve(
         "charging_limit", "x.soc", (0.0, 1.0), {}, ("par.T", (263.15, 273.15, 298.15))
@@ -297,7 +304,6 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "mu": 0.35,
     },
     "flux_map": _saturated_map(),
-    "lead_screw": {"lead": 4 * MM, "d_m": 20 * MM, "mu": 0.12, "beta": 15 * DEG},
     "pad_hysteresis": {
         "law": "constant",
         "k_1": 1e7,
@@ -310,6 +316,7 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "W_4": 100.0,
         "F_ref": 2e4,
     },
+    "parking_cable": {"mu": 0.1, "phi": 3.0, "i": 5.0},
     "pad_wear": {
         "kappa_0": 3.6e-14,
         "T_hot": 503.0,
@@ -331,7 +338,7 @@ VALUES: dict[str, dict[str, Any]] = {  # of elements that no parameter set conta
         "G": 60 * BAR,
     },
     "rack": {"r_p": 15 * MM, "eta": 0.9},
-    "seal_rollback": {"k": 6e5, "z_max": 0.3 * MM},
+    "seal_rollback": {"k": 6e5, "z_max": 0.06 * MM},
     "solenoid_armature": {
         **_SEAT,
         "unpowered": "closed",

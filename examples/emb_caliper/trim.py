@@ -90,7 +90,7 @@ def memory_at(F: float, par: BrakeParameters) -> Any:
         duty_beta=beta,
         next_alpha=alpha,
         next_beta=beta,
-        z_q=v,
+        z_q=v + par.ecu.current.R_a * i,
     )
 
 

@@ -68,7 +68,7 @@ def pressure_tick(r: Readings, m: Any, u: Stimulus, par: Any) -> Any:
     law = par.ecu.refill
     before = refill.State(m.refill, m.p_kept)
     state = refill.output(before, refill.Input(m.p_ref, r.theta, r.p), law)
-    retracts = ops.where(ops.fabs(state.phase - refill.RETRACTS) < 0.5, 1.0, 0.0)
+    retracts = ops.where(ops.fabs(state.phase - refill.RETRACTS) < 0.5, m.separate_on, 0.0)
     reference = plunger_pressure.State(m.theta_ref)
     seen = plunger_pressure.Input((1.0 - retracts) * m.p_ref, r.p)
     controlled = plunger_pressure.output(reference, seen, par.ecu.pressure)

@@ -38,6 +38,7 @@ def motor(values):
 def law(values, **changes):
     own = {
         "omega_c": 1 / (3 * T),
+        "R_a": 0.0,
         "p": values["p"],
         "R_hat": values["R"],
         "L_d_hat": values["L_d"],
@@ -368,3 +369,14 @@ def test_an_observer_of_the_speed_is_quiet_and_lags_as_stated():
     accelerating = estimate(0.5 * 1e4 * t**2, speed_observer.State(0.0, 0.0))
     lag = (1e4 * t[-1] - accelerating[-1]) / 1e4
     assert lag == pytest.approx(2 / par.omega_o, rel=0.03)
+
+
+def test_active_damping_speeds_up_the_rejection_of_disturbances():
+    """An error of the flux linkage decays with L/R = 67 ms, or with L/(R + R_a) = 2.3 ms."""
+    wrong, left = 0.95 * TRACTION["psi"], {}
+    for R_a in (0.0, 0.5):
+        run = Traction(TRACTION, 10.0, 100.0, ticks=120, psi_hat=wrong, R_a=R_a, i_max=240.0)
+        left[R_a] = abs(run.end.i_q - foc.set_points(10.0, 0.0, 240.0, 1.0, run.law).i_q)
+    peak = 3 * 100.0 * 0.05 * TRACTION["psi"] / (TRACTION["L_q"] / (3 * T))  # voltage over k_p
+    assert left[0.0] == pytest.approx(peak * math.exp(-0.012 / 0.067), rel=0.1)
+    assert left[0.5] < 0.03 * peak

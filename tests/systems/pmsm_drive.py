@@ -176,6 +176,7 @@ LINK = {
 }
 CURRENT = {
     "omega_c": 1 / (3 * T_S),
+    "R_a": 0.0,
     "p": 4.0,
     "R_hat": SERVO["R"],
     "L_d_hat": SERVO["L_d"],

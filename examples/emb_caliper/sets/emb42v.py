@@ -195,6 +195,7 @@ _FIELD_ORIENTED = {
         lambda par: 1.0 / (3.0 * par.ecu.T_current), "phase margin of 61.4 degrees"
     ),
     "ecu.current.p": derived(lambda par: par.motor.p, _KNOWN),
+    "ecu.current.R_a": chosen(0.0, "the speed control rejects disturbances"),
     "ecu.current.R_hat": derived(lambda par: par.motor.R, _KNOWN),
     "ecu.current.L_d_hat": derived(lambda par: par.motor.L_d, _KNOWN),
     "ecu.current.L_q_hat": derived(lambda par: par.motor.L_q, _KNOWN),

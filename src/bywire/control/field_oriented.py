@@ -15,6 +15,7 @@ from bywire.core.quantities import (
     FluxLinkage,
     Fraction,
     Inductance,
+    InternalResistance,
     PolePairs,
     Resistance,
     Unit,
@@ -37,14 +38,17 @@ class Parameters(ParameterSet):
     With ``"hexagon"``, each phase can use the whole bus. The fundamental then reaches
     :math:`2 V_{dc}/\pi` (six steps), with harmonics of the orders 5 and 7.
 
-    The gains follow from the model: :math:`k_p = L \omega_c` and :math:`k_i = R \omega_c`. With a
-    total delay of 1.5 sample times, :math:`\omega_c = 1/(3 T)` has a phase margin of 61.4 degrees.
+    The gains follow from the model: :math:`k_p = L \omega_c` and :math:`k_i = (R + R_a) \omega_c`.
+    With a total delay of 1.5 sample times, :math:`\omega_c = 1/(3 T)` has a phase margin of 61.4
+    degrees.
     """
 
     omega_c: Bandwidth
     """bandwidth of the current loops"""
     p: PolePairs
     """number of pole pairs"""
+    R_a: InternalResistance
+    """active damping: resistance that the control adds; 0 for none"""
     R_hat: Resistance
     """resistance of a phase"""
     L_d_hat: Inductance
@@ -227,8 +231,8 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     r"""Advance the controller by one sample.
 
     .. math::
-        v_d = k_p e_d + z_d - \omega_e L_q i_q, \quad
-        v_q = k_p e_q + z_q + \omega_e (L_d i_d + \psi)
+        v_d = k_p e_d + z_d - R_a i_d - \omega_e L_q i_q, \quad
+        v_q = k_p e_q + z_q - R_a i_q + \omega_e (L_d i_d + \psi)
 
     A voltage above the limit keeps its direction. The integral terms follow the limited voltage.
     The voltage then gets a lead angle: the rotation of the rotor until the middle of the sample in
@@ -243,9 +247,15 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
 
     Notes
     -----
-    Without this weight, a slow motor whose resistance needs the whole voltage would weaken its
-    field completely. No current would then remain for the torque. Where :math:`\psi / L_d` is less
-    than the maximum amplitude, the circle of that amplitude is not the optimum at high speed.
+    Without active damping, the zero of the control cancels the winding's pole L/R. Set points are
+    then followed without this pole, but a disturbance such as an error of the flux linkage decays
+    with it. A resistance :math:`R_a` moves the pole of the damped winding to
+    :math:`(R + R_a) / L`.
+
+    Without the weight of field weakening, a slow motor whose resistance needs the whole voltage
+    would weaken its field completely. No current would then remain for the torque. Where
+    :math:`\psi / L_d` is less than the maximum amplitude, the circle of that amplitude is not the
+    optimum at high speed.
     """
     omega_e = par.p * u.omega
     c, s = ops.cos(u.theta_e), ops.sin(u.theta_e)
@@ -254,8 +264,9 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     reserved = par.reserve * usual
     ref = set_points(u.i_ref, x.i_fw, u.i_lim, _allowed_flux(reserved, omega_e, par), par)
     e_d, e_q = ref.i_d - i_d, ref.i_q - i_q
-    v_d = par.L_d_hat * par.omega_c * e_d + x.z_d - omega_e * par.L_q_hat * i_q
-    v_q = par.L_q_hat * par.omega_c * e_q + x.z_q + omega_e * (par.L_d_hat * i_d + par.psi_hat)
+    damped_d, damped_q = x.z_d - par.R_a * i_d, x.z_q - par.R_a * i_q
+    v_d = par.L_d_hat * par.omega_c * e_d + damped_d - omega_e * par.L_q_hat * i_q
+    v_q = par.L_q_hat * par.omega_c * e_q + damped_q + omega_e * (par.L_d_hat * i_d + par.psi_hat)
     size = ops.sqrt(v_d * v_d + v_q * v_q)
     share = most / ops.fmax(size, most)  # a voltage of zero has no direction
     within_d, within_q = share * v_d, share * v_q
@@ -265,7 +276,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     if par.voltage == "hexagon":
         v_alpha, v_beta = hexagon(v_alpha, v_beta, u.V_dc)
         within_d, within_q = c * v_alpha + s * v_beta, c * v_beta - s * v_alpha
-    k_i = par.R_hat * par.omega_c
+    k_i = (par.R_hat + par.R_a) * par.omega_c
     excess = size - reserved
     relief = _relief((v_d, v_q), ops.fmax(size, reserved), omega_e, (i_d, i_q), ref.beyond, par)
     weakened = ops.where(excess > 0.0, excess * relief, excess)

@@ -10,10 +10,11 @@ from pydantic import Field, model_validator
 from bywire.core import ops
 from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet, RuleError
-from bywire.core.quantities import Conductance, Force, Nodes, Unit, Volume
+from bywire.core.quantities import Conductance, Force, Nodes, Unit
 from bywire.core.signals import Energy, Power, Signal
 from bywire.plant import air
 
+DeadVolume = Annotated[float, Unit("m**3", 5e-4), Field(gt=0, allow_inf_nan=False)]
 SpringStiffness = Annotated[float, Unit("N/m", 8e3), Field(ge=0, allow_inf_nan=False)]
 Travel = Annotated[float, Signal("m", "travel of the rod", 0.03)]
 GaugePressure = Annotated[float, Signal("Pa", "chamber pressure", 4e5)]
@@ -26,7 +27,7 @@ class Parameters(ParameterSet):
     over the last third of the stroke.
     """
 
-    V_0: Volume
+    V_0: DeadVolume
     """volume with the rod at rest, including the hose"""
     x_table: Annotated[Nodes, Unit("m", 0.02)]
     """travels of the table, increasing from 0"""

@@ -560,7 +560,7 @@ class CudaKernel:
             plan = memory.room(_plan_size(schedule, self._inputs[1]))
             pieces = _pieces(schedule, begin, end)
             counts = [rows_between(schedule, *piece) for piece in pieces]
-            recording = _Recording(rows, self.lanes, min(max(self._most, *counts), sum(counts)))
+            recording = _Recording(rows, counts, self._most, self.array)
             room = memory.room(recording.size)
             apart = np.empty(0) if ends is None else np.ascontiguousarray(ends.values)
             edges = memory.room(apart.nbytes)
@@ -646,23 +646,36 @@ def _frames(schedule: Schedule) -> int:
 class _Recording:
     """Destination of the rows of several time intervals, in the order of the caller's array.
 
-    The rows go directly into the caller's array if they fill all of it. Otherwise, they go through
-    a buffer.
+    If the rows fill the caller's array and have room on the device, they are fetched at the end,
+    directly into the array. Otherwise, the rows of each interval go through a buffer.
 
     Parameters
     ----------
     rows
         The caller's array; see `CudaKernel.advance`.
-    lanes
-        Number of threads.
+    counts
+        Number of rows of each interval.
     most
         Maximum number of rows on the device.
+    array
+        ``array(shape)`` allocates the buffer.
     """
 
-    def __init__(self, rows: Array, lanes: int, most: int) -> None:
-        self._rows, self._most, self._at, self.count = rows, most, 0, 0
+    def __init__(
+        self,
+        rows: Array,
+        counts: Sequence[int],
+        most: int,
+        array: Callable[[tuple[int, ...]], Array],
+    ) -> None:
+        self._rows, self._at, self.count = rows, 0, 0
         self._order = sorted(range(3), key=lambda axis: -rows.strides[axis])
-        self.size = _FLOAT * len(rows) * most * rows.shape[2]
+        straight = rows[:, : sum(counts)].transpose(self._order)
+        self._is_whole = straight.flags.c_contiguous and sum(counts) <= most
+        self._most = sum(counts) if self._is_whole else max(counts)
+        size = len(rows) * self._most * rows.shape[2]
+        self._buffer = array((0 if self._is_whole else size,))
+        self.size = _FLOAT * size
         self.begin([0])
 
     @property
@@ -680,11 +693,11 @@ class _Recording:
         self._planned = int(totals[totals <= self._most].max(initial=counts[0]))
         shape = len(self._rows), self._planned, self._rows.shape[2]
         target = self._rows[:, self._at : self._at + self._planned].transpose(self._order)
-        self._target, self._is_whole = target, target.flags.c_contiguous
-        if self._is_whole:
-            self._place = target
-        else:
-            self._place = np.empty([shape[axis] for axis in self._order])
+        buffer = self._buffer[: math.prod(shape)] if not self._is_whole else None
+        self._target = target
+        self._place = (
+            target if buffer is None else buffer.reshape([shape[axis] for axis in self._order])
+        )
         strides = self._place.transpose(np.argsort(self._order)).strides
         self.apart = [stride // _FLOAT for stride in strides]
 

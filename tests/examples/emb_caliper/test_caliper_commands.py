@@ -128,6 +128,9 @@ def test_identification_recovers_the_friction_within_its_intervals(
     code, out, err = command("identify", "friction-strokes", "--synthetic", "1")
     assert code == 0, err
     assert "friction.G" in out
+    code, out, err = command("identify", "clamp-force-strokes", "--synthetic", "1")
+    assert code == 0, err
+    assert "ecu.estimator.G_hat" in out
 
 
 def test_workers_know_a_brake_that_was_loaded_by_path(command: Any) -> None:

@@ -326,9 +326,7 @@ def test_hysteresis_has_its_loss(caliper: Path) -> None:
 # --- Identification, campaign, study
 
 
-def test_a_recorded_stroke_gives_the_starting_values(
-    emb: Any, par: Any, command: Callable[..., tuple[int, str, str]]
-) -> None:
+def test_a_recorded_stroke_gives_the_starting_values(emb: Any, par: Any) -> None:
     from bywire.identification.method import Effort
 
     method = emb("methods.clamp_force_strokes").METHOD
@@ -343,9 +341,6 @@ def test_a_recorded_stroke_gives_the_starting_values(
     # Without the release, scale and friction are not separate.
     with pytest.raises(ParameterError, match="do not contain a stroke in both directions"):
         method.identify(data.isel(time=slice(0, 2500)), par, method.defaults, Effort())
-    code, out, err = command("identify", "clamp-force-strokes", "--synthetic", "1")
-    assert code == 0, err
-    assert "ecu.estimator.G_hat" in out
 
 
 def test_the_method_detects_pads_with_hysteresis(emb: Any, par: Any) -> None:

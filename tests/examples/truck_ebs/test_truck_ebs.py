@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bywire
+from bywire.core.errors import InputError
 from bywire.plant import air
 
 FOLDER = Path(__file__).parents[3] / "examples" / "truck_ebs"
@@ -167,3 +168,23 @@ def test_pressure_control_detects_a_dead_pilot_valve_but_not_a_lost_demand():
     assert outcome.loc["pilot.gain 0.5", "class"] == "covered"
     assert outcome.loc["p_set.stuck 0 bar", "class"] == "undetected"
     assert outcome.loc["ecu.dead", "class"] == "covered"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "faults", "message"),
+    [
+        ({"feed.b": 1.0}, [], r"feed\.b = 1 is not valid: it must be > 0 and < 1"),
+        ({"p_s": "-2 bar"}, [], r"p_s = -2 bar is not valid: it must be > 0 bar"),
+        ({"gas.p_atm": "-1 bar"}, [], r"gas\.p_atm = -1 bar is not valid: it must be > 0 bar"),
+        ({"chamber.V_0": "0 l"}, [], r"chamber\.V_0 = 0 l is not valid: it must be > 0 l"),
+        (
+            {},
+            ["pilot.stuck=-2 bar@0.1 s"],
+            r"pressure = -2 bar .* must be > -1\.013 bar, .* vacuum",
+        ),
+        ({"caliper.clearance": "6 mm"}, [], r"They must move farther than caliper\.clearance"),
+    ],
+)
+def test_impossible_values_are_rejected(overrides, faults, message):
+    with pytest.raises(InputError, match=message):
+        bywire.run("ebs-response", overrides=overrides, faults=faults)
