@@ -79,11 +79,14 @@ class Law(NamedTuple):
 def _on_the_bus(prefix: str, label: str) -> Any:
     """Return the memory of a bus, whose fields begin with a prefix."""
     make: Callable[..., Any] = NamedTuple
-    slot = Annotated[float, Signal("N*m", f"{label} on the bus", 300.0)]
+    slot = Annotated[float, Signal("N*m", f"{label}, in transit on the bus", 300.0)]
     return make("Bus", [(f"{prefix}_{name}", slot) for name in torque_bus.State._fields])
 
 
-_SENT, _REPORT = _on_the_bus("sent", "friction demand"), _on_the_bus("report", "motor torque")
+_SENT, _REPORT = (
+    _on_the_bus("sent", "demand on the friction brake"),
+    _on_the_bus("report", "motor torque"),
+)
 Memory: Any = joined(__name__, "Memory", Law, _SENT, _REPORT)
 """memory of the blending law and of the bus"""
 
