@@ -242,10 +242,13 @@ def _assemblies_with_numbers() -> Mapping[str, Any]:
 
 
 def faults() -> dict[str, list[tuple[str, Mode]]]:
-    """Return every mode by name, each with the assemblies that have it."""
+    """Return every mode by name, each with the assemblies that have it.
+
+    Those of brakes loaded by path come first.
+    """
     every: dict[str, list[tuple[str, Mode]]] = {}
     seen = set()
-    for cited in PARAMETER_SETS.all().values():
+    for cited in _in_order(PARAMETER_SETS).values():
         if cited.assembly in seen or cited.assembly not in ASSEMBLIES.all():
             continue
         seen.add(cited.assembly)
