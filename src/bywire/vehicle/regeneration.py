@@ -40,9 +40,9 @@ class Parameters(ParameterSet):
     T_s: Duration
     """sample time"""
     t_ahead: TimeConstant
-    """time by which the law predicted looks ahead: delay of the bus and lag of the brake"""
+    """look-ahead time of the law "predicted": delay of the bus plus lag of the brake"""
     tau_a: TimeConstant
-    """time constant of the deceleration's filter, for the law predicted"""
+    """time constant of the deceleration filter (law "predicted")"""
 
     @model_validator(mode="after")
     def _bus_holds_the_delay(self) -> Parameters:
