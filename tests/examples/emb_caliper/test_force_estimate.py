@@ -140,6 +140,7 @@ def test_one_stroke_trains_the_estimate(
     changes = {} if theta_0 is None else {f"{ESTIMATOR}theta_0": theta_0}
     figures = row(name, {}, wrong, changes, law="strokes")
     assert figures["strokes"] == 2.0
+    assert abs(figures["contact_error"]) < 0.5
     assert figures["rms_curve"] <= 1.0
     assert figures["rms_error"] <= 1.0
     assert figures["error_max"] <= 2.0
