@@ -48,10 +48,16 @@ class Hydraulics(Assembly[ParT, MemoryT]):
     pedal_stop = Part(end_stop, work="W_pedal_stop", loss="E_pedal_stop", which="pedal")
     supply = Part(battery_supply, loss="E_supply")
     motor = Part(dc_motor, loss="E_copper")
-    gear = Part(ball_screw_gear, output={"x": "x_mc"})
+    gear = Part(ball_screw_gear, output={"x": "x_mc"}, labels={"x": "plunger travel"})
     seal = Part(seal_friction)
     E_friction = Integral("J", "dry friction of screw and seals", role=Role("sink", "dry friction"))
-    chamber = Part(master_cylinder, par="plunger", state={"p": "p_mc"}, loss="E_damping")
+    chamber = Part(
+        master_cylinder,
+        par="plunger",
+        state={"p": "p_mc"},
+        labels={"p": "plunger pressure"},
+        loss="E_damping",
+    )
     port = Part(reservoir_port)
     E_port = Integral(
         "J", "energy lost through the port", role=Role("sink", "reservoir", returns="taken")

@@ -64,3 +64,5 @@ def test_what_is_not_known_is_refused(bywire, tmp_path):
     refused(bywire("faults", "motorcycel"), "did you mean 'motorcycle'")
     refused(bywire("faults", tmp_path / "none.toml"), "none.toml")
     refused(bywire("run", "hard-braking", "--fault", "motor.hott"), "did you mean 'motor.hot'")
+    late = bywire("run", "hard-braking", "--fault", "motor.hot=0.2 s")
+    refused(late, "write '1.5'", "write --fault 'motor.hot@0.2 s'")

@@ -170,8 +170,10 @@ def test_the_index_fits_a_screen_and_a_topic_opens(bywire: Bywire) -> None:
     assert max(map(len, lines)) <= 80
     (line,) = (line for line in lines if line.startswith("loops "))
     assert int(line.split()[1]) == len(LOOPS.all())
-    every, topic = bywire("list", "--json").object, bywire("list", "Parameter-Sets", "--json")
-    assert topic.object == {"parameter_sets": every["parameter_sets"]}
+    every = bywire("list", "--json").object
+    for topic in ("Parameter-Sets", "sets"):
+        shown = bywire("list", topic, "--json").object
+        assert shown == {"parameter_sets": every["parameter_sets"]}
     assert every["loops"]["pressure"] in " ".join(bywire("list", "loops").out.split())
 
 

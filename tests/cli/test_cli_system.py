@@ -237,6 +237,8 @@ def test_its_own_names_come_first(bywire: Bywire) -> None:
     refused(
         bywire("margins", "xyzzy", *caliper), "unknown loop 'xyzzy': valid names are clamp-force"
     )
+    faults = bywire("list", "faults", "--json", *caliper).object["faults"]
+    assert "(emb-caliper, " in next(iter(faults.values()))
 
 
 def test_a_set_for_an_assembly_that_does_not_exist_is_said(bywire: Bywire, tmp_path: Path) -> None:

@@ -336,3 +336,9 @@ def test_parameters_that_follow_the_state_are_the_elements_everywhere() -> None:
     assert PAR.motor.R_m == plain.motor.par.R_m
     with raises(ModelError, name="parameter", value="R"):
         VariedNothing().at(Screw.state(), Held(0.0), PAR)
+
+
+def test_labels_name_outputs_too() -> None:
+    part = Part(ball_screw_gear, output={"x": "x_mc"}, labels={"x": "plunger travel"})
+    assert part.outputs()["x_mc"].label == "plunger travel"
+    assert "x" not in {signal.label for signal in part.states().values()}

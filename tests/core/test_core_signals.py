@@ -117,6 +117,11 @@ def test_drawn_statuses_are_the_real_ones():
     ("name", "known", "text"),
     [
         ("brakng", ["braking", "release"], "unknown x 'brakng': did you mean 'braking'?"),
+        (
+            "inlet.stuck",
+            ["i_set.stuck", "angle.stuck", "inlet.stuck-open", "inlet.stuck-closed"],
+            "did you mean 'inlet.stuck-closed', 'inlet.stuck-open', 'i_set.stuck'?",
+        ),
         ("zzz", ["b", "a"], "unknown x 'zzz': valid names are a, b"),
         ("zzz", [], "unknown x 'zzz': no names are defined here"),
         ("zzz", [f"name{k:02}" for k in range(20)], "and 8 more"),

@@ -106,7 +106,7 @@ def test_a_transient_agrees_with_an_independent_integration(law):
 
 
 CASES = {
-    "linear": (parameters, {}, 1e-10),
+    "linear": (parameters, {}, 1e-11),
     "dead time": (parameters, {"inverter__law": "dead time", "inverter__V_f": 0.4}, 1e-6),
     "iron": (parameters, {"motor__iron": "drag", "motor__c_h": 2.0, "motor__c_e": 1e-2}, 1e-8),
     "diode": (parameters, {"link__law": "diode", "link__chopper": "resistor"}, 1e-6),

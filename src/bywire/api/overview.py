@@ -109,7 +109,9 @@ def is_topic(name: str) -> bool:
 
 
 def _plain(topic: str) -> str:
-    return topic.lower().replace("-", "_").replace(" ", "_")
+    """Return a topic in the spelling of the index; ``sets`` means parameter sets."""
+    plain = topic.lower().replace("-", "_").replace(" ", "_")
+    return "parameter_sets" if plain == "sets" else plain
 
 
 def _things() -> tuple[Mapping[str, Any], list[str]]:

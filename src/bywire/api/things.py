@@ -242,10 +242,13 @@ def _assemblies_with_numbers() -> Mapping[str, Any]:
 
 
 def faults() -> dict[str, list[tuple[str, Mode]]]:
-    """Return every mode by name, each with the assemblies that have it."""
+    """Return every mode by name, each with the assemblies that have it.
+
+    Those of brakes loaded by path come first.
+    """
     every: dict[str, list[tuple[str, Mode]]] = {}
     seen = set()
-    for cited in PARAMETER_SETS.all().values():
+    for cited in _in_order(PARAMETER_SETS).values():
         if cited.assembly in seen or cited.assembly not in ASSEMBLIES.all():
             continue
         seen.add(cited.assembly)
@@ -620,11 +623,11 @@ def _stimulus(stimulus: StimulusKind) -> Object:
 def _kpi(kpi: Any) -> Object:
     """Return a key figure's meaning, its unit, and the experiments that have it."""
     experiments = {e.name: e.kpis for e in EXPERIMENTS.all().values() if kpi.name in e.kpis}
-    units = sorted({readable_units(kpis[kpi.name]) for kpis in experiments.values()})
+    units = sorted({kpis[kpi.name] for kpis in experiments.values()})
     return {
         "summary": kpi.definition,
         **({"details": details} if (details := _details(kpi)) else {}),
-        "unit": " or ".join(units),
+        "unit": readable_units(*units) if units else "",
         "experiments": ", ".join(experiments),
     }
 

@@ -32,6 +32,7 @@ E = TypeVar("E", bound="BywireError")
 
 _SHOWN = 60  # characters of a value in a message
 _MOST = 12  # names in a list
+_FEW = 3  # names that begin like an unknown name, which come first in suggestions
 _NEAR = 0.7  # minimum similarity of a suggestion in an error that lists all names
 _BARE_KEY = re.compile(r"[\w-]+", re.ASCII)
 
@@ -202,7 +203,9 @@ def unknown_name(
     every, leading = {*known}, sorted(first)
     others = sorted(every.difference(leading))
     candidates = [*leading, *(by_likeness(others, [name]) if len(every) > _MOST else others)]
-    close = get_close_matches(name, candidates, n=3, cutoff=0.5)
+    begun = [each for each in candidates if name and each.startswith(name)]
+    alike = get_close_matches(name, candidates, n=3, cutoff=0.5)
+    close = list(dict.fromkeys([*begun, *alike] if len(begun) <= _FEW else alike))[:3]
     hint = f"did you mean {', '.join(map(repr, close))}?" if close else _listing(candidates)
     if listed and not close and len(candidates) > _MOST:
         hint = f"{hint} ({listed!r} shows all)"

@@ -73,7 +73,7 @@ class PartOptions(TypedDict, total=False):
     state
         Names of the states in the assembly, if they differ from the element's names.
     labels
-        Labels of the states, if they differ from the element's labels.
+        Labels of states and outputs, if they differ from the element's labels.
     fixed
         States that enter the element's own equations as values only, for periodic terms and slowly
         varying geometry.
@@ -226,7 +226,8 @@ class Part(Generic[X, U, F, P]):
         if not self.has("State"):
             return {}
         signals = signals_of(self.element.State)
-        for name in (*self.renamed, *self.labels, *self.fixed):
+        labels = [name for name in self.labels if name not in self.output]
+        for name in (*self.renamed, *labels, *self.fixed):
             if name not in signals:
                 raise unknown_name("state", name, signals).at(self.where, ModelError)
         return {
@@ -248,7 +249,9 @@ class Part(Generic[X, U, F, P]):
             if name not in known:
                 raise unknown_name("output", name, known).at(self.where, ModelError)
         return {
-            there: replace(known[name], label=known[name].label + self.ending)
+            there: replace(
+                known[name], label=self.labels.get(name, known[name].label) + self.ending
+            )
             for name, there in self.output.items()
         }
 

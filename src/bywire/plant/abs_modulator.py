@@ -9,7 +9,6 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.signals import Signal
 
-Share = Annotated[float, Signal("1", "opened fraction", 0.5, low=0.0, high=1.0)]
 Command = Annotated[float, Signal("1", "valve command", 0.5, low=0.0, high=1.0)]
 
 
@@ -28,8 +27,8 @@ FAULTS = (ParameterFault("sluggish", "frozen diaphragms", ("tau_hold", "tau_vent
 class State(NamedTuple):
     """Openings of the valves."""
 
-    hold: Share
-    vent: Share
+    hold: Annotated[float, Signal("1", "opening of the hold valve", 0.5, low=0.0, high=1.0)]
+    vent: Annotated[float, Signal("1", "opening of the vent valve", 0.5, low=0.0, high=1.0)]
 
 
 class Factors(NamedTuple):

@@ -14,7 +14,6 @@ from bywire.core.signals import Signal
 
 Overlap = Annotated[float, Unit("1", 0.05), Field(ge=0, lt=0.9, allow_inf_nan=False)]
 CrackPressure = Annotated[float, Unit("Pa", 1e4), Field(ge=0, allow_inf_nan=False)]
-Opening = Annotated[float, Signal("1", "opened fraction", 1.0)]
 
 
 class Parameters(ParameterSet):
@@ -77,8 +76,8 @@ class Input(NamedTuple):
 class Output(NamedTuple):
     """Openings of the two seats. At most one is positive."""
 
-    feed: Opening
-    exhaust: Opening
+    feed: Annotated[float, Signal("1", "opening of the feed seat", 1.0)]
+    exhaust: Annotated[float, Signal("1", "opening of the exhaust seat", 1.0)]
 
 
 def mass(par: Parameters) -> Annotated[float, Signal("s", "time constant", 1e-2)]:

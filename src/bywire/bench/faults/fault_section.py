@@ -13,7 +13,14 @@ from pydantic import Field, model_validator
 from bywire.bench.changes import settled
 from bywire.bench.faults.modes import Mode, modes_of
 from bywire.core.callers import option
-from bywire.core.errors import ParameterError, UnknownNameError, not_valid, quoted, unknown_name
+from bywire.core.errors import (
+    ParameterError,
+    UnitError,
+    UnknownNameError,
+    not_valid,
+    quoted,
+    unknown_name,
+)
 from bywire.core.model import Model
 from bywire.core.parameters import Leaf, ParameterSet
 from bywire.core.quantities import TimeConstant, Unit
@@ -254,10 +261,26 @@ def _value(where: str, section: Mapping[str, Any], mode: Mode) -> float:
             )
         return 0.0
     given = section.get("value", mode.value)
-    value = number(given, mode.unit, f"{where}.value")
+    try:
+        value = number(given, mode.unit, f"{where}.value")
+    except UnitError as error:
+        if not _is_time(given):
+            raise
+        onset = f"{mode.name}@{given}"
+        raise error.reworded(
+            f"{error}. For a fault that starts at this time, write --fault {quoted(onset)}"
+        ) from None
     text = given if isinstance(given, str) else ""
     require_admissible(mode, value, f"{where}.value", text)
     return value
+
+
+def _is_time(given: object) -> bool:
+    try:
+        number(given, "s", "")
+    except (UnitError, TypeError, ValueError):
+        return False
+    return isinstance(given, str)
 
 
 def require_admissible(mode: Mode, value: float, where: str, text: str = "") -> None:
