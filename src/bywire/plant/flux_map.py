@@ -276,7 +276,24 @@ def _sums(rises: list[float]) -> list[float]:
     return total
 
 
-def _derivatives(par: Parameters) -> tuple[tuple[Rows, Rows, Rows], ...]:
+_Orders = tuple[tuple[Rows, Rows, Rows], ...]
+_LATEST: list[tuple[Parameters, _Orders]] = []  # of the tables that were used last
+
+
+def _derivatives(par: Parameters) -> _Orders:
+    """Return the coenergy's derivatives at the nodes, which depend only on the tables.
+
+    An assembly evaluates the map dozens of times with the same tables, as symbols.
+    """
+    for known, orders in tuple(_LATEST):
+        if known is par:
+            return orders
+    orders = _computed(par)
+    _LATEST[:] = [*_LATEST[-1:], (par, orders)]
+    return orders
+
+
+def _computed(par: Parameters) -> _Orders:
     """Return the coenergy's derivatives at the nodes, by their orders in i_d and i_q.
 
     The coenergy is the mean of the integrals along both edges of the tables.
