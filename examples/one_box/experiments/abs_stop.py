@@ -21,8 +21,7 @@ from bywire.authoring import (
     Unit,
 )
 from bywire.plant import road
-from bywire.vehicle import ideal_corner_distance, surfaces
-from bywire.vehicle.ideal_stop import RidingSpeed
+from bywire.vehicle import RidingSpeed, ideal_corner_distance, surfaces
 from one_box.rigs.corner import OneBoxCorner, OneBoxCornerParameters, rolling
 
 Demand = Annotated[float, Unit("Pa", 1e7), Field(gt=0, allow_inf_nan=False)]

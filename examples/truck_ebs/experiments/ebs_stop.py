@@ -11,8 +11,7 @@ import xarray as xr
 
 from bywire.authoring import Case, Experiment, Figures, Kpi, Recordings
 from bywire.plant import road
-from bywire.vehicle import CornerParameters, ideal_corner_distance, surfaces
-from bywire.vehicle.ideal_stop import RidingSpeed
+from bywire.vehicle import CornerParameters, RidingSpeed, ideal_corner_distance, surfaces
 from truck_ebs import model
 from truck_ebs.experiments.ebs_response import DemandOptions, demanded
 from truck_ebs.models import abs as with_abs
