@@ -12,6 +12,7 @@ from bywire.authoring import (
     Case,
     Duration,
     Experiment,
+    Figures,
     Kpi,
     ParameterSet,
     Recordings,
@@ -23,6 +24,21 @@ from emb_caliper.experiments.slow_strokes import TopForce
 from emb_caliper.parameters import BrakeParameters
 
 FirstForce = Annotated[float, Unit("N", 1e4), Field(ge=0, allow_inf_nan=False)]
+
+FIGURES = Figures(
+    undefined="the clamp force does not increase in the evaluated stroke",
+    rms_error=("%", "RMS error of the estimate, in % of full scale."),
+    error_99=("%", "99 % of errors, in % of full scale."),
+    error_max=("%", "Maximum error of the estimate, in % of full scale."),
+    rms_curve=("%", "RMS error of the curve alone, in % of full scale."),
+    rms_balance=("%", "RMS error of the torque balance alone, held at rest, in % of full scale."),
+    contact_error=("rad", "Contact angle that the ECU has found, minus the true angle."),
+    contact_angle=("rad", "Contact angle that the ECU has found."),
+    stiffness_scale=("1", "Scale of the stiffness curve."),
+    friction_unloaded=("N*m", "Friction torque without load."),
+    friction_per_force=("N*m/N", "Friction torque per clamp force."),
+    strokes=("1", "Strokes that trained the estimate."),
+)
 
 
 class Options(ParameterSet):
@@ -100,25 +116,22 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     }
     rms = {name: float(np.sqrt(np.mean(e * e))) for name, e in errors.items()}
     size = np.abs(errors["estimate"])
-    of_full = "in % of full scale."
-    return (
-        Kpi("rms_error", rms["estimate"], "%", f"RMS error of the estimate, {of_full}"),
-        Kpi("error_99", float(np.quantile(size, 0.99)), "%", f"99 % of errors, {of_full}"),
-        Kpi("error_max", float(size.max()), "%", f"Maximum error of the estimate, {of_full}"),
-        Kpi("rms_curve", rms["curve"], "%", f"RMS error of the curve alone, {of_full}"),
-        Kpi(
-            "rms_balance",
-            rms["balance"],
-            "%",
-            f"RMS error of the torque balance alone, held at rest, {of_full}",
-        ),
-        Kpi(
-            "contact_error",
-            float(run["theta_0_hat"].values[-1]) - contact(run["theta"].values[now], F[now]),
-            "rad",
-            "Contact angle that the ECU has found, minus the true angle.",
-        ),
-        *_learned(run),
+    last = {
+        name: float(run[name].values[-1])
+        for name in ("theta_0_hat", "s_hat", "C_hat", "G_hat", "strokes")
+    }
+    return FIGURES(
+        rms_error=rms["estimate"],
+        error_99=float(np.quantile(size, 0.99)),
+        error_max=float(size.max()),
+        rms_curve=rms["curve"],
+        rms_balance=rms["balance"],
+        contact_error=last["theta_0_hat"] - contact(run["theta"].values[now], F[now]),
+        contact_angle=last["theta_0_hat"],
+        stiffness_scale=last["s_hat"],
+        friction_unloaded=last["C_hat"],
+        friction_per_force=last["G_hat"],
+        strokes=last["strokes"],
     )
 
 
@@ -131,20 +144,6 @@ def contact(theta: Array, F: Array) -> float:
     if not (F[k : k + 3].size == 3 and F[k] > 0.0 and np.all(np.diff(F[k : k + 3]) > 0.0)):
         return float("nan")
     return float(np.polyfit(F[k : k + 3], theta[k : k + 3], 2)[-1])
-
-
-def _learned(run: xr.Dataset) -> tuple[Kpi, ...]:
-    """Return the properties in use at the end of the recording."""
-    last = {
-        name: float(run[name].values[-1]) for name in ("theta_0_hat", "s_hat", "C_hat", "G_hat")
-    }
-    return (
-        Kpi("contact_angle", last["theta_0_hat"], "rad", "Contact angle that the ECU has found."),
-        Kpi("stiffness_scale", last["s_hat"], "1", "Scale of the stiffness curve."),
-        Kpi("friction_unloaded", last["C_hat"], "N*m", "Friction torque without load."),
-        Kpi("friction_per_force", last["G_hat"], "N*m/N", "Friction torque per clamp force."),
-        Kpi("strokes", float(run["strokes"].values[-1]), "1", "Strokes that trained the estimate."),
-    )
 
 
 EXPERIMENT = Experiment(
@@ -166,18 +165,6 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     finish=finish,
-    kpis={
-        "rms_error": "%",
-        "error_99": "%",
-        "error_max": "%",
-        "rms_curve": "%",
-        "rms_balance": "%",
-        "contact_error": "rad",
-        "contact_angle": "rad",
-        "stiffness_scale": "1",
-        "friction_unloaded": "N*m",
-        "friction_per_force": "N*m/N",
-        "strokes": "1",
-    },
+    kpis=FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

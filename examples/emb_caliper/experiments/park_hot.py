@@ -9,6 +9,7 @@ from bywire.authoring import (
     Case,
     Duration,
     Experiment,
+    Figures,
     Kpi,
     ParameterSet,
     Recordings,
@@ -20,23 +21,15 @@ from emb_caliper.models.parking import Parameters, ParkingBrake, released
 
 Array = NDArray[np.float64]
 RECORD = 0.02  # s
-MEANINGS = {
-    "time_to_park": "Time until the motor is switched off.",
-    "first_force": "Clamp force 0.5 s after the first clamping.",
-    "least_force": "Minimum clamp force while parked.",
-    "creep": "Travel in the 10 s that follow.",
-    "clamped_again": "How often the brake clamps again.",
-    "residual_force": "Clamp force at the end.",
-    "energy": "Energy from the battery.",
-}
-KPIS = (
-    ("time_to_park", "s"),
-    ("first_force", "N"),
-    ("least_force", "N"),
-    ("creep", "m"),
-    ("clamped_again", "1"),
-    ("residual_force", "N"),
-    ("energy", "J"),
+FIGURES = Figures(
+    undefined="the brake does not reach its force",
+    time_to_park=("s", "Time until the motor is switched off."),
+    first_force=("N", "Clamp force 0.5 s after the first clamping."),
+    least_force=("N", "Minimum clamp force while parked."),
+    creep=("m", "Travel in the 10 s that follow."),
+    clamped_again=("1", "How often the brake clamps again."),
+    residual_force=("N", "Clamp force at the end."),
+    energy=("J", "Energy from the battery."),
 )
 
 
@@ -83,22 +76,20 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     time, F, mode = (run[name].values for name in ("time", "F_cl", "mode"))
     parked = time < options.hold - 1e-6
     if not (parked & (mode == parking.HOLDS)).any():
-        text = "the brake does not reach its force"
-        return tuple(Kpi(name, float("nan"), unit, MEANINGS[name], text) for name, unit in KPIS)
+        return FIGURES(**dict.fromkeys(FIGURES.units, np.nan))
     off = int(np.argmax(mode == parking.HOLDS))
     rested = int(np.searchsorted(time, time[off] + 0.5))
     steady = F[parked & (time >= time[rested])]
     after = parked & (time >= time[rested]) & (time <= time[rested] + 10.0)
-    values = {
-        "time_to_park": time[off],
-        "first_force": F[rested],
-        "least_force": steady.min(),
-        "creep": np.ptp(run["travel"].values[after]),
-        "clamped_again": run["clamped"].values[parked][-1],
-        "residual_force": F[-1],
-        "energy": run["E_source"].values[-1],
-    }
-    return tuple(Kpi(name, float(values[name]), unit, MEANINGS[name]) for name, unit in KPIS)
+    return FIGURES(
+        time_to_park=time[off],
+        first_force=F[rested],
+        least_force=steady.min(),
+        creep=np.ptp(run["travel"].values[after]),
+        clamped_again=run["clamped"].values[parked][-1],
+        residual_force=F[-1],
+        energy=run["E_source"].values[-1],
+    )
 
 
 EXPERIMENT = Experiment(
@@ -109,6 +100,6 @@ EXPERIMENT = Experiment(
     defaults=Options(T_disc=573.15, hold=600.0, release=2.0),
     cases=cases,
     judge=judge,
-    kpis=dict(KPIS),
+    kpis=FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )
