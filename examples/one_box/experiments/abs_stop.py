@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
 
 import numpy as np
 import xarray as xr
-from pydantic import Field
 
 from bywire.authoring import (
     Array,
@@ -17,14 +15,13 @@ from bywire.authoring import (
     Figures,
     Kpi,
     ParameterSet,
+    Pressure,
     Recordings,
-    Unit,
 )
 from bywire.plant import road
 from bywire.vehicle import RidingSpeed, ideal_corner_distance, surfaces
 from one_box.rigs.corner import OneBoxCorner, OneBoxCornerParameters, rolling
 
-Demand = Annotated[float, Unit("Pa", 1e7), Field(gt=0, allow_inf_nan=False)]
 SLOW = 4.0
 """speed [m/s] below which the wheel may lock"""
 _SETTLED = 0.5  # s until the first cycle is over
@@ -55,7 +52,7 @@ class Options(ParameterSet):
 
     v_0: RidingSpeed
     """initial speed"""
-    p_brake: Demand
+    p_brake: Pressure
     """pressure demand of the driver from time zero"""
     surface: road.SurfaceName
     """road surface"""

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
 
 import numpy as np
 import xarray as xr
-from pydantic import Field
 
 from bywire.authoring import (
     Array,
@@ -17,14 +15,13 @@ from bywire.authoring import (
     Figures,
     Kpi,
     ParameterSet,
+    Pressure,
     Recordings,
-    Unit,
 )
 from bywire.plant import stiffening_caliper
 from one_box.rigs.corner import OneBoxCorner, OneBoxCornerParameters, rolling
 from one_box.trim import memory_at, state_at
 
-HeldPressure = Annotated[float, Unit("Pa", 1e7), Field(gt=0, allow_inf_nan=False)]
 _FIRST = 3
 FIGURES = Figures(
     pressure_low=("Pa", f"Smallest wheel pressure after {_FIRST} cycles."),
@@ -42,7 +39,7 @@ FIGURES = Figures(
 class Options(ParameterSet):
     """The commands. The plunger holds its pressure before the inlet valve opens."""
 
-    p_hold: HeldPressure
+    p_hold: Pressure
     """pressure that the plunger holds"""
     t_fill: Duration
     """duration of the first build-up"""

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from bywire.authoring import (
     Case,
@@ -17,15 +15,14 @@ from bywire.authoring import (
     Figures,
     Kpi,
     ParameterSet,
+    Pressure,
     Recordings,
     TimeConstant,
-    Unit,
 )
 from truck_ebs.parameters import TruckParameters
 from truck_ebs.rigs.brake_rig import BrakeRig
 
 Array = NDArray[np.float64]
-Demand = Annotated[float, Unit("Pa", 4e5), Field(gt=0, allow_inf_nan=False)]
 FIGURES = Figures(
     undefined="the pressure does not reach this level within the recording",
     time_to_10=("s", "Time from the start of the demand to 10 % of the final pressure."),
@@ -39,7 +36,7 @@ FIGURES = Figures(
 class DemandOptions(ParameterSet):
     """A demand from time zero."""
 
-    p_brake: Demand
+    p_brake: Pressure
     """demanded pressure"""
     duration: Duration
     """recording time"""

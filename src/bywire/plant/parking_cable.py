@@ -16,7 +16,6 @@ from bywire.plant import drum
 SheathFriction = Annotated[float, Unit("1", 0.1), Field(ge=0, lt=1, allow_inf_nan=False)]
 Wrap = Annotated[float, Unit("rad", 3.0), Field(ge=0, le=20, allow_inf_nan=False)]
 LeverRatio = Annotated[float, Unit("1", 5.0), Field(gt=1, allow_inf_nan=False)]
-Newtons = Annotated[float, Signal("N", "force", 500.0)]
 
 
 class Parameters(ParameterSet):
