@@ -60,8 +60,8 @@ def torque(law: str) -> Callable[[], float]:
 
 STANDARD = "the friction brake follows what the motor reports, so it takes over"
 TRUSTING = (
-    "with the law commanded, the friction brake complements the motor's set point, and does not "
-    "notice that the motor is lost. Only the least demand that keeps the pads on the disc remains"
+    "the friction brake adds to the motor's set point, and does not respond to the loss of the "
+    "motor. Only the minimum demand that keeps the pads on the disc remains"
 )
 ROWS = (
     Row(
@@ -73,7 +73,7 @@ ROWS = (
     ),
     Row(
         "regeneration.battery.full",
-        "stopping distance on this hill",
+        "stopping distance on the same hill",
         round(distance(), 1),
         "m",
         full("stopping_distance"),

@@ -56,7 +56,7 @@ def estimated(theta: float, i: float, m: Any, par: Any) -> Any:
         **state._asdict(), T_load=out.T_L, F_balance=out.F_balance, balance_valid=out.valid
     )
     if ecu.training.law == "off":
-        return m
+        return m._replace(theta_0_hat=held.theta_0, s_hat=held.s, C_hat=held.C, G_hat=held.G)
     learned = training.output(
         learned,
         training.Input(theta, state.motion, out.omega, out.T_L, out.T_J, out.valid),

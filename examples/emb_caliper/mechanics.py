@@ -6,9 +6,9 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any, ClassVar, TypeVar
 
-from bywire.authoring import Assembly, Bounds, Task
+from bywire.authoring import Assembly, Bounds, Integral, Part, Role, Shown, Task, Wire
 from bywire.core import ops
-from bywire.plant import end_stop, floating_caliper, pad_hysteresis
+from bywire.plant import battery_supply, dc_motor, end_stop, floating_caliper, pad_hysteresis
 from emb_caliper.elements import (
     ball_screw,
     load_cell,
@@ -22,15 +22,89 @@ ParT = TypeVar("ParT", bound=BrakeParameters)
 MemoryT = TypeVar("MemoryT")
 
 
-class CaliperBrake(Assembly[ParT, MemoryT]):
-    """Wires of a brake from the rotor to the pads, for any motor.
+# Recorded signals of any motor: motion, loads and power, losses beyond the motor.
+MOTION = (
+    "F_cl",
+    "F_ref",
+    "F_meas",
+    "F_used",
+    "F_hat",
+    "F_curve",
+    "F_balance",
+    "T_load",
+    "balance_valid",
+    "on_estimate",
+    "theta_0_hat",
+    "s_hat",
+    "C_hat",
+    "G_hat",
+    "strokes",
+    "x",
+    "theta",
+    "omega",
+    "omega_ref",
+    "i",
+    "i_ref",
+)
+LOADS = (
+    "torque",
+    "T_fr",
+    "F_stop",
+    "stuck",
+    "parked",
+    "sat_speed",
+    "sat_current",
+    "sat_duty",
+    "P_el",
+    "E_source",
+    "E_supply",
+)
+LOSSES = (
+    "E_viscous",
+    "E_friction",
+    "E_caliper",
+    "E_hysteresis",
+    "E_stop",
+    "E_stored",
+    "t_stuck",
+)
 
-    A brake lists its parts, and defines ``electrics``, ``source_power`` and the ticks of its ECU.
-    It has one dry friction on the shaft, and contacts at the pads and two end stops.
+
+class CaliperBrake(Assembly[ParT, MemoryT]):
+    """Parts and wires of a brake, for any motor.
+
+    A brake replaces the DC motor if it has another, adds the wires of its electrics, and defines
+    ``electrics``, ``source_power`` and the ticks of its ECU. It has one dry friction on the shaft,
+    and contacts at the pads and two end stops.
     """
 
     laws: ClassVar[ModuleType]
     """module of the ECU's ticks"""
+    frictions: ClassVar[tuple[str, ...]] = ("omega",)
+
+    E_source = Integral("J", "energy from battery or source", role=Role("source", "source"))
+    supply = Part(battery_supply, loss="E_supply")
+    motor: Any = Part(dc_motor, loss="E_copper")
+    rotor = Part(rotor, loss="E_viscous")
+    dry = Part(load_friction, par="friction")
+    E_friction = Integral("J", "dry friction loss", role=Role("sink", "dry friction"))
+    gear = Part(planetary_gear)
+    screw = Part(ball_screw, output=("x",))
+    pads = Part(
+        floating_caliper, par="caliper", output=("F_cl",), work="W_caliper", loss="E_caliper"
+    )
+    hysteresis = Part(pad_hysteresis, loss="E_hysteresis")
+    force = Part(load_cell)
+    stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
+    t_stuck = Integral("s", "time stuck", role=Role("standstill"))
+
+    i_dc = Wire("A", "battery current", 10.0)
+    torque = Wire("N*m", "motor torque", 1.0)
+    F_pads = Wire("N", "clamp force", 1e4)
+    T_fr = Shown("N*m", "friction torque", 0.1)
+    F_stop = Shown("N", "end stop load on the piston", 1e3)
+    stuck = Shown("1", "shaft stuck")
+    P_el = Shown("W", "electrical power from battery or source", 100.0)
 
     def electrics(self, w: Any) -> None:
         """Connect supply, power stage and motor, and set the motor torque."""

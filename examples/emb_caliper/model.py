@@ -6,25 +6,10 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any, ClassVar, Self
 
-from bywire.authoring import Integral, Part, Role, Shown, Wire
-from bywire.plant import (
-    angle_sensor,
-    battery_supply,
-    dc_motor,
-    end_stop,
-    floating_caliper,
-    h_bridge,
-    pad_hysteresis,
-)
+from bywire.authoring import Wire
+from bywire.plant import angle_sensor, battery_supply, dc_motor, h_bridge
 from emb_caliper import ecu
-from emb_caliper.elements import (
-    ball_screw,
-    load_cell,
-    load_friction,
-    planetary_gear,
-    rotor,
-)
-from emb_caliper.mechanics import CaliperBrake
+from emb_caliper.mechanics import LOADS, LOSSES, MOTION, CaliperBrake
 from emb_caliper.parameters import CaliperBrakeParameters as Par
 
 
@@ -35,76 +20,15 @@ class EmbCaliper(CaliperBrake[Par, Any]):
     laws: ClassVar[ModuleType] = ecu
     Memory: ClassVar = ecu.Memory
     Stimulus: ClassVar = ecu.Stimulus
-    frictions: ClassVar[tuple[str, ...]] = ("omega",)
-
-    E_source = Integral("J", "energy from battery or source", role=Role("source", "source"))
-    supply = Part(battery_supply, loss="E_supply")
-    motor = Part(dc_motor, loss="E_copper")
-    rotor = Part(rotor, loss="E_viscous")
-    dry = Part(load_friction, par="friction")
-    E_friction = Integral("J", "dry friction loss", role=Role("sink", "dry friction"))
-    gear = Part(planetary_gear)
-    screw = Part(ball_screw, output=("x",))
-    pads = Part(
-        floating_caliper, par="caliper", output=("F_cl",), work="W_caliper", loss="E_caliper"
-    )
-    hysteresis = Part(pad_hysteresis, loss="E_hysteresis")
-    force = Part(load_cell)
-    stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
-    t_stuck = Integral("s", "time stuck", role=Role("standstill"))
 
     voltage = Wire("V", "motor voltage", 10.0)
-    i_dc = Wire("A", "battery current", 10.0)
-    torque = Wire("N*m", "motor torque", 1.0)
-    F_pads = Wire("N", "clamp force", 1e4)
-    T_fr = Shown("N*m", "friction torque", 0.1)
-    F_stop = Shown("N", "end stop load on the piston", 1e3)
-    stuck = Shown("1", "shaft stuck")
-    P_el = Shown("W", "electrical power from battery or source", 100.0)
-
     records: ClassVar[tuple[str, ...]] = (
-        "F_cl",
-        "F_ref",
-        "F_meas",
-        "F_used",
-        "F_hat",
-        "F_curve",
-        "F_balance",
-        "T_load",
-        "balance_valid",
-        "on_estimate",
-        "theta_0_hat",
-        "s_hat",
-        "C_hat",
-        "G_hat",
-        "strokes",
-        "x",
-        "theta",
-        "omega",
-        "omega_ref",
-        "i",
-        "i_ref",
+        *MOTION,
         "duty",
         "voltage",
-        "torque",
-        "T_fr",
-        "F_stop",
-        "stuck",
-        "parked",
-        "sat_speed",
-        "sat_current",
-        "sat_duty",
-        "P_el",
-        "E_source",
-        "E_supply",
+        *LOADS,
         "E_copper",
-        "E_viscous",
-        "E_friction",
-        "E_caliper",
-        "E_hysteresis",
-        "E_stop",
-        "E_stored",
-        "t_stuck",
+        *LOSSES,
     )
 
     def electrics(self, w: Self) -> None:

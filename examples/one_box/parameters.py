@@ -57,7 +57,7 @@ class OneBoxParameters(ParameterSet):
     simulator: pedal_simulator.Parameters
     pedal_stop: end_stop.Parameters
     x_pedal: Length
-    """largest travel of the pedal rod"""
+    """maximum travel of the pedal rod"""
     supply: battery_supply.Parameters
     bridge: h_bridge.Parameters
     motor: dc_motor.Parameters

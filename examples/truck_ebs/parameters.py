@@ -43,17 +43,18 @@ class EcuParameters(ParameterSet):
     """Electronic pressure control of the relay valve.
 
     ``control``: with ``"feedforward"``, the control pressure follows the demand, and only the relay
-    valve controls the pressure. With ``"closed-loop"``, the ECU corrects the measured pressure.
+    valve controls the pressure. With ``"closed-loop"``, the ECU corrects the error of the measured
+    pressure.
     """
 
     control: Literal["feedforward", "closed-loop"]
-    """whether the ECU corrects the measured pressure"""
+    """whether the ECU corrects the error of the measured pressure"""
     T_s: Duration
     """sample time"""
     T_bus: TimeConstant
     """time constant of bus, electronics and pilot valve"""
     p_max: Pressure
-    """largest control pressure"""
+    """maximum control pressure"""
     p_range: Pressure
     """gauge pressure at full range of the sensor"""
     filter: anti_alias_filter.Parameters

@@ -20,7 +20,7 @@ from truck_ebs.parameters import TruckParameters as Par
 from truck_ebs.rigs.brake_rig import BrakeRig
 
 OPENING = 0.02
-"""opened fraction of the feed seat at an operating point"""
+"""open fraction of the feed seat at an operating point"""
 
 
 def rod_travel(p: float, par: Par) -> float:

@@ -57,7 +57,7 @@ def test_signals_in_memory_are_a_measurement() -> None:
     assert again.source == "signals in memory"
     assert again.estimates["seal friction"]["A"] == made.estimates["seal friction"]["A"]
     assert again.put_in == {}
-    with raises(ParameterError, name="synthetic", valid="only one of measurement files"):
+    with raises(ParameterError, name="synthetic", valid="only one of these: measurement files"):
         bywire.identify("seal-friction", made.data, synthetic=2)
     with raises(ParameterError, name="unknowns"):
         bywire.identify("seal-friction", made.data, question=bywire.Question(unknowns="A"))

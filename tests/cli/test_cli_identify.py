@@ -186,7 +186,7 @@ def test_a_study_is_stored_with_its_seeds(bywire: Bywire, tmp_path: Path) -> Non
 
 def test_refusals(bywire: Bywire, tmp_path: Path) -> None:
     refused(bywire("identify", "seal-frictio"), "seal-friction")
-    refused(bywire("identify", "seal-friction"), "needs one of", "F [N], x [m], p [Pa]")
+    refused(bywire("identify", "seal-friction"), "needs measurement files", "F [N], x [m], p [Pa]")
     refused(bywire("identify", "seal-friction", "--synthetic", "1", "--study", "5"), "only one of")
     for flag in ("--map", "--holdout"):
         refused(

@@ -121,6 +121,7 @@ LAW = {
     "t_inrush": 0.1,
     "t_again": 1.0,
     "again": 2.0,
+    "t_unlock": 0.5,
     "t_rest": 0.05,
     "theta_open": 0.0,
 }
@@ -192,6 +193,16 @@ def test_the_law_unloads_a_pawl_before_it_releases(lock):
     runs(4, 0.0)
     assert x.engaged == 0.0
     assert (law.x.mode, law.runs(1, engaged=0.0)) == (parking.RELEASES, (parking.RELEASES, -1.0))
+
+
+def test_a_brake_that_does_not_unlock_stops_its_motor():
+    law = Law(lock="mono-stable")
+    law.runs(5, park=1.0, F=5e3, engaged=1.0)
+    law.runs(2, F=20e3)
+    assert law.runs(40, park=0.0) == (parking.UNLOCKS, 1.0)
+    assert law.x.powered == 1.0
+    assert law.runs(20) == (parking.UNLOCKS, 0.0)
+    assert law.x.powered == 0.0
 
 
 def test_clamping_again_must_be_below_the_clamping_force():

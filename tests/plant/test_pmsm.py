@@ -224,7 +224,7 @@ def test_field_weakening_reaches_a_speed_beyond_the_back_emf():
 
 def test_a_stalled_motor_keeps_its_field():
     """The resistance, and not the magnets, needs the voltage above the reserve."""
-    run = Run(SERVO, 38.0, ticks=3000, k_fw=300.0, i_max=40.0)
+    run = Run(SERVO, 38.0, ticks=600, k_fw=300.0, i_max=40.0)
     assert SERVO["R"] * 38.0 > 0.95 * inverter.largest_voltage(24.0)
     assert run.end.i_q == pytest.approx(38.0, abs=0.1)
     assert abs(run.end.i_d) < 0.1
@@ -277,7 +277,7 @@ def test_field_weakening_finds_the_largest_torque(rpm, torque, monkeypatch):
     monkeypatch.setattr("test_pmsm.SUBSTEPS", 2)
     near = pmsm.State(-220.0, 60.0)
     more = {"k_fw": 600.0, "i_max": 240.0, "reserve": 0.95, "i_fw": -70.0, "start": near}
-    run = Traction(TRACTION, 240.0, rpm * math.pi / 30, ticks=7000, **more)
+    run = Traction(TRACTION, 240.0, rpm * math.pi / 30, ticks=4000, **more)
     last = [pmsm.State(*x) for x in zip(run.i_d[-800:], run.i_q[-800:], strict=True)]
     found = np.mean([pmsm.airgap_torque(x, run.par) for x in last])
     assert found == pytest.approx(torque, rel=2e-3)

@@ -100,7 +100,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     }
     rms = {name: float(np.sqrt(np.mean(e * e))) for name, e in errors.items()}
     size = np.abs(errors["estimate"])
-    of_full = "in per cent of full scale."
+    of_full = "in % of full scale."
     return (
         Kpi("rms_error", rms["estimate"], "%", f"RMS error of the estimate, {of_full}"),
         Kpi("error_99", float(np.quantile(size, 0.99)), "%", f"99 % of errors, {of_full}"),
@@ -112,8 +112,25 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
             "%",
             f"RMS error of the torque balance alone, held at rest, {of_full}",
         ),
+        Kpi(
+            "contact_error",
+            float(run["theta_0_hat"].values[-1]) - contact(run["theta"].values[now], F[now]),
+            "rad",
+            "Contact angle that the ECU has found, minus the true angle.",
+        ),
         *_learned(run),
     )
+
+
+def contact(theta: Array, F: Array) -> float:
+    """Return the angle [rad] at which the pads touch, or NaN if the force does not increase.
+
+    It is the angle at zero force of the parabola through the first three samples with force.
+    """
+    k = int(np.argmax(F > 0.0))
+    if not (F[k : k + 3].size == 3 and F[k] > 0.0 and np.all(np.diff(F[k : k + 3]) > 0.0)):
+        return float("nan")
+    return float(np.polyfit(F[k : k + 3], theta[k : k + 3], 2)[-1])
 
 
 def _learned(run: xr.Dataset) -> tuple[Kpi, ...]:
@@ -155,6 +172,7 @@ EXPERIMENT = Experiment(
         "error_max": "%",
         "rms_curve": "%",
         "rms_balance": "%",
+        "contact_error": "rad",
         "contact_angle": "rad",
         "stiffness_scale": "1",
         "friction_unloaded": "N*m",

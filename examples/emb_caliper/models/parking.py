@@ -14,6 +14,7 @@ from bywire.authoring import (
     ParameterSet,
     Part,
     Role,
+    RuleError,
     Shown,
     Signal,
     Task,
@@ -23,7 +24,6 @@ from bywire.authoring import (
 )
 from bywire.control import parking
 from bywire.core import ops
-from bywire.core.parameters import RuleError
 from bywire.plant import (
     battery_supply,
     dc_motor,

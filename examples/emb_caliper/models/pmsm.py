@@ -8,24 +8,9 @@ from typing import Any, ClassVar, Self
 
 from bywire.authoring import Bounds, Integral, Part, Role, Shown, Wire
 from bywire.core import ops
-from bywire.plant import (
-    angle_sensor,
-    battery_supply,
-    end_stop,
-    floating_caliper,
-    inverter,
-    pad_hysteresis,
-    pmsm,
-)
+from bywire.plant import angle_sensor, battery_supply, inverter, pmsm
 from emb_caliper import ecu, ecu_pmsm
-from emb_caliper.elements import (
-    ball_screw,
-    load_cell,
-    load_friction,
-    planetary_gear,
-    rotor,
-)
-from emb_caliper.mechanics import CaliperBrake
+from emb_caliper.mechanics import LOADS, LOSSES, MOTION, CaliperBrake
 from emb_caliper.parameters import SynchronousBrakeParameters as Par
 
 
@@ -35,87 +20,27 @@ class EmbCaliperPmsm(CaliperBrake[Par, Any]):
     name: ClassVar[str] = "emb-caliper-pmsm"
     Memory: ClassVar = ecu_pmsm.Memory
     Stimulus: ClassVar = ecu.Stimulus
-    frictions: ClassVar[tuple[str, ...]] = ("omega",)
     laws: ClassVar[ModuleType] = ecu_pmsm
 
-    E_source = Integral("J", "energy from battery or source", role=Role("source", "source"))
-    supply = Part(battery_supply, loss="E_supply")
     inverter = Part(inverter, loss="E_inverter")
     motor = Part(pmsm, loss="E_copper")
     E_iron = Integral("J", "eddy-current loss", role=Role("sink", "iron"))
-    rotor = Part(rotor, loss="E_viscous")
-    dry = Part(load_friction, par="friction")
-    E_friction = Integral("J", "dry friction loss", role=Role("sink", "dry friction"))
-    gear = Part(planetary_gear)
-    screw = Part(ball_screw, output=("x",))
-    pads = Part(
-        floating_caliper, par="caliper", output=("F_cl",), work="W_caliper", loss="E_caliper"
-    )
-    hysteresis = Part(pad_hysteresis, loss="E_hysteresis")
-    force = Part(load_cell)
-    stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
-    t_stuck = Integral("s", "time stuck", role=Role("standstill"))
-
-    i_dc = Wire("A", "battery current", 10.0)
     v_d = Wire("V", "d-axis voltage", 10.0)
     v_q = Wire("V", "q-axis voltage", 10.0)
-    torque = Wire("N*m", "motor torque", 1.0)
-    F_pads = Wire("N", "clamp force", 1e4)
     i = Shown("A", "motor current, an amplitude with the torque's sign", 10.0)
-    T_fr = Shown("N*m", "friction torque", 0.1)
-    F_stop = Shown("N", "end stop load on the piston", 1e3)
-    stuck = Shown("1", "shaft stuck")
-    P_el = Shown("W", "electrical power from battery or source", 100.0)
-
     records: ClassVar[tuple[str, ...]] = (
-        "F_cl",
-        "F_ref",
-        "F_meas",
-        "F_used",
-        "F_hat",
-        "F_curve",
-        "F_balance",
-        "T_load",
-        "balance_valid",
-        "on_estimate",
-        "theta_0_hat",
-        "s_hat",
-        "C_hat",
-        "G_hat",
-        "strokes",
-        "x",
-        "theta",
-        "omega",
-        "omega_ref",
-        "i",
-        "i_ref",
+        *MOTION,
         "i_d",
         "i_d_ref",
         "i_q",
         "i_q_ref",
         "v_d",
         "v_q",
-        "torque",
-        "T_fr",
-        "F_stop",
-        "stuck",
-        "parked",
-        "sat_speed",
-        "sat_current",
-        "sat_duty",
-        "P_el",
-        "E_source",
-        "E_supply",
+        *LOADS,
         "E_inverter",
         "E_copper",
         "E_iron",
-        "E_viscous",
-        "E_friction",
-        "E_caliper",
-        "E_hysteresis",
-        "E_stop",
-        "E_stored",
-        "t_stuck",
+        *LOSSES,
     )
 
     def electrics(self, w: Self) -> None:

@@ -24,7 +24,7 @@ _CURVE = "-7.23 x^3 + 33.7 x^2 - 4.97 x kN (x in mm), from its positive root on,
 _MOTOR = "EMB motor in the benchmark of Strathmann and Oehlerking (ARCH 2015)"
 
 _A, _B, _C = -7.23e12, 33.7e9, -4.97e6  # coefficients of the cubic, SI
-_PADS = "Maxwell springs of a few per cent of the load; no value for this brake is available"
+_PADS = "Maxwell springs of a few percent of the load; no value for this brake is available"
 _TOUCH = (-_B + math.sqrt(_B * _B - 4.0 * _A * _C)) / (2.0 * _A)  # its root, where the pads touch
 
 _PLANT = {

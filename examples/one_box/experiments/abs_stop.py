@@ -61,7 +61,7 @@ class Options(ParameterSet):
     surface: road.SurfaceName
     """road surface"""
     duration: Duration
-    """longest recording time"""
+    """maximum recording time"""
 
 
 def cases(par: OneBoxCornerParameters, options: Options, _: object = None) -> tuple[Case, ...]:

@@ -45,7 +45,7 @@ class Options(ParameterSet):
     F_foot: FootForce
     """foot force"""
     t_rise: TimeConstant
-    """time in which it rises and falls"""
+    """rise time and fall time of this force"""
     t_hold: Duration
     """time from the beginning to the release"""
     t_end: Duration

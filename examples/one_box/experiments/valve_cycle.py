@@ -45,15 +45,15 @@ class Options(ParameterSet):
     p_hold: HeldPressure
     """pressure that the plunger holds"""
     t_fill: Duration
-    """time of the first build-up"""
+    """duration of the first build-up"""
     t_cycle: Duration
     """time between two releases"""
     t_release: Duration
-    """time of a release, and of the hold after it"""
+    """duration of a release, and of the hold after it"""
     t_pulse: Duration
     """time between two pulses of the inlet valve"""
     t_open: Duration
-    """time of a pulse"""
+    """duration of a pulse"""
     duration: Duration
     """recording time"""
 

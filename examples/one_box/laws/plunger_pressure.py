@@ -32,13 +32,13 @@ class Parameters(ParameterSet):
     omega_max: MotorSpeed
     """limit of the motor speed"""
     lead: MotorAngle
-    """largest distance of the reference from the measured angle"""
+    """maximum distance between the reference and the measured angle"""
     p_on: Pressure
     """demand below which the plunger returns to its rest position"""
     theta_rest: MotorAngle
     """motor angle at the rest position"""
     theta_end: MotorAngle
-    """largest motor angle"""
+    """maximum motor angle"""
     A_hat: Area
     """area of the plunger assumed by the ECU"""
     k_hat: GearRatio

@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
     theta_end: MotorAngle
     """motor angle at which the plunger is refilled"""
     omega: MotorSpeed
-    """speed at which the plunger then builds up the kept pressure"""
+    """motor speed at which the plunger builds up the pressure again after a refill"""
 
 
 class State(NamedTuple):
@@ -47,7 +47,7 @@ def output(x: State, u: Input, par: Parameters) -> State:
     Notes
     -----
     The plunger retracts and draws fluid through its cup seal. It then builds up the pressure that
-    the brakes have kept, and the valve opens again. A demand below the kept pressure ends the
+    is trapped in the brakes, and the valve opens again. A demand below the kept pressure ends the
     refill, too.
     """
     begins = ops.where(u.theta > par.theta_begin, RETRACTS, HOLDS)

@@ -20,7 +20,7 @@ class Parameters(ParameterSet):
     """Band in which the pressure is held, and the prediction."""
 
     band: Pressure
-    """largest distance from the demand at which the pressure is held"""
+    """maximum deviation from the demand at which the pressure is held"""
     t_lead: TimeConstant
     """prediction horizon, about the delay of the valves"""
 

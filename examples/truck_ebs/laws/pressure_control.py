@@ -40,9 +40,9 @@ class Parameters(ParameterSet):
     p_dead: DeadZone
     """error that the controller ignores, so that the valve can rest"""
     p_wait: Pressure
-    """error above which the integral waits, because the valve is fully open"""
+    """error above which the integral term is held, because the valve is fully open"""
     p_trim: Pressure
-    """largest integral part"""
+    """maximum of the integral term"""
 
 
 class State(NamedTuple):

@@ -28,7 +28,7 @@ class Stimulus(NamedTuple):
 
     p_set: Annotated[float, Signal("Pa", "pressure demand", 4e5)]
     parks: Annotated[float, Signal("1", "hand valve in the parking position", low=0.0, high=1.0)]
-    burst: Annotated[float, Signal("1", "opened fraction of the tank", low=0.0, high=1.0)]
+    burst: Annotated[float, Signal("1", "open fraction of the tank", low=0.0, high=1.0)]
 
 
 class Switches(NamedTuple):
@@ -36,7 +36,7 @@ class Switches(NamedTuple):
 
     on: Annotated[float, Signal("1", "compressor loaded")]
     parked: Annotated[float, Signal("1", "park chamber exhausted by the hand valve")]
-    opened: Annotated[float, Signal("1", "opened fraction of the tank")]
+    opened: Annotated[float, Signal("1", "open fraction of the tank")]
 
 
 Memory: Any = signals.joined(__name__, "Memory", ecu.Memory, Switches)

@@ -404,15 +404,15 @@ def _require_one_source(
     study = f"{option('study') if is_command_line() else 'bywire.trust, with count'} COUNT"
     if sources and synthetic is not None:
         raise ParameterError(
-            f"{method.name} accepts only one of measurement files, {option('synthetic')} SEED, or "
-            f"{study}",
+            f"{method.name} accepts only one of these: measurement files, {option('synthetic')} "
+            f"SEED, or {study}",
             name=option("synthetic"),
-            valid=f"only one of measurement files, {option('synthetic')} SEED, or {study}",
+            valid=f"only one of these: measurement files, {option('synthetic')} SEED, or {study}",
         )
     if not sources and synthetic is None:
         signals = ", ".join(f"{n} [{unit}]" for n, unit in method.signals.items())
         raise ParameterError(
-            f"{method.name} needs one of measurement files with the signals {signals}, "
+            f"{method.name} needs measurement files with the signals {signals}, "
             f"{option('synthetic')} SEED, or {study}",
             name=option("synthetic"),
             valid=f"measurement files with the signals {signals}",

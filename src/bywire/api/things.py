@@ -623,11 +623,11 @@ def _stimulus(stimulus: StimulusKind) -> Object:
 def _kpi(kpi: Any) -> Object:
     """Return a key figure's meaning, its unit, and the experiments that have it."""
     experiments = {e.name: e.kpis for e in EXPERIMENTS.all().values() if kpi.name in e.kpis}
-    units = sorted({readable_units(kpis[kpi.name]) for kpis in experiments.values()})
+    units = sorted({kpis[kpi.name] for kpis in experiments.values()})
     return {
         "summary": kpi.definition,
         **({"details": details} if (details := _details(kpi)) else {}),
-        "unit": " or ".join(units),
+        "unit": readable_units(*units) if units else "",
         "experiments": ", ".join(experiments),
     }
 

@@ -61,6 +61,7 @@ from bywire.core.model import Matrix as Matrix
 from bywire.core.model import Model as Model
 from bywire.core.model import Task as Task
 from bywire.core.parameters import ParameterSet as ParameterSet
+from bywire.core.parameters import RuleError as RuleError
 from bywire.core.parts import Integral as Integral
 from bywire.core.parts import Part as Part
 from bywire.core.parts import Port as Port

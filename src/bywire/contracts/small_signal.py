@@ -82,7 +82,9 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
         text = f"{how}, {name} differs from its linear response by {off:.1e} of its largest value"
         yield measured(off, MISMATCH, text, place)
     if not moving:
-        raise NotCheckedError(f"from {start.known}, the controllers do not move any state")
+        raise NotCheckedError(
+            f"starting from {start.known}, the controllers do not change any state"
+        )
 
 
 def _require_loops_off_corners(trial: Trial) -> None:

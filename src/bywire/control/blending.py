@@ -17,7 +17,7 @@ LeastTorque = Annotated[float, Unit("N*m", 20.0), Field(ge=0, allow_inf_nan=Fals
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-2), Gt(0)]
 Torque = Annotated[float, Signal("N*m", "braking torque", 300.0)]
 Demand = Annotated[float, Signal("N*m", "demanded braking torque", 300.0), Ge(0)]
-Acting = Annotated[float, Signal("1", "slip control acts", 0.5), Ge(0), Le(1)]
+Acting = Annotated[float, Signal("1", "whether slip control is active", 0.5), Ge(0), Le(1)]
 
 
 class Parameters(ParameterSet):
@@ -34,17 +34,17 @@ class Parameters(ParameterSet):
     """
 
     category: Literal["A", "B"]
-    """whether the motor is part of the service brake: B, or not: A"""
+    """whether the motor is part of the service brake (B) or not (A)"""
     law: Literal["reported", "commanded", "predicted"]
-    """motor torque that the friction brake complements"""
+    """motor torque that the friction brake supplements"""
     rate: TorqueRate
-    """largest rate of the motor's command"""
+    """maximum rate of the motor command"""
     T_least: LeastTorque
     """friction demand that remains while the pedal brakes, to keep the pads on the disc"""
     t_off: Duration
-    """time in which the motor's command falls to zero when slip control acts"""
+    """time in which the motor command falls to zero once slip control is active"""
     t_back: TimeConstant
-    """time after slip control in which the motor does not brake"""
+    """time after the end of slip control during which the motor does not brake"""
 
 
 class State(NamedTuple):
@@ -81,8 +81,8 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
 
     In category B, the set point :math:`T_{set}` is the sum of both demands. In category A, the
     motor follows the demand of the released accelerator, and :math:`T_f` is the pedal's demand.
-    Corners: the motor's limit, the largest rate, the least friction demand, and the switch of slip
-    control.
+    Corners: the motor's limit, the maximum rate, the minimum friction demand, and the switch of
+    slip control.
 
     Notes
     -----

@@ -105,7 +105,7 @@ class Parameters(ParameterSet):
     k: Corner
     """rate of each of the two poles of the torque filter"""
     play: AnglePlay
-    """motion that is treated as a motion in one direction, above the sensor's resolution"""
+    """minimum motion that determines the direction, above the sensor's resolution"""
     t_rest: Duration
     """time without such a motion after which the shaft is considered to be at rest"""
     omega_min: Speed

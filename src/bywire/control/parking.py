@@ -46,6 +46,8 @@ class Parameters(ParameterSet):
     """time after which the brake checks the force, or with law "current" clamps again"""
     again: Count
     """number of times that the brake may clamp again"""
+    t_unlock: Duration
+    """time after which the law stops trying to unlock the pawl"""
     t_rest: TimeConstant
     """time after a release until the motor is at rest, so that a mono-stable pawl may engage"""
     theta_open: MotorAngle
@@ -93,7 +95,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     Notes
     -----
     The pawl is unlocked while the motor clamps, which unloads the tooth. A bi-stable pawl gets
-    pulses until it moves.
+    pulses until it moves. If it does not move in time, the brake stays locked, and the motor stops.
     """
     parks = u.park > 0.5
     if par.law == "force":
@@ -121,7 +123,8 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     restart = ops.where(is_low, 0.0, due)  # a check that finds enough force
     elapsed = ops.where(kept * (1.0 - restart) > 0.5, x.elapsed + T, 0.0 * T)
     counted = x.clamped + ops.where(parks, again * ops.where(x.mode == HOLDS, 1.0, 0.0), 0.0)
-    forward = ops.where(mode == CLAMPS, 1.0, ops.where(mode == UNLOCKS, 1.0, 0.0))
+    tries = ops.where(elapsed < par.t_unlock, 1.0, 0.0)
+    forward = ops.where(mode == CLAMPS, 1.0, ops.where(mode == UNLOCKS, tries, 0.0))
     powered = _solenoid(mode, elapsed, x.powered, u.engaged, par)
     state = State(mode, elapsed, ops.where(mode == RELEASED, 0.0, counted), powered)
     return state, Output(forward - ops.where(mode == RELEASES, 1.0, 0.0), powered)
@@ -133,7 +136,9 @@ def _solenoid(mode: float, elapsed: float, before: float, engaged: float, par: P
         return 0.0 * mode
     if par.lock == "mono-stable":
         stops = ops.where(elapsed < par.t_rest, 1.0 - engaged, 0.0)
-        return ops.where(mode >= UNLOCKS, 1.0, ops.where(mode == RELEASED, stops, 0.0))
+        tries = ops.where(elapsed < par.t_unlock, 1.0, 0.0)
+        moves = ops.where(mode == RELEASES, 1.0, ops.where(mode == UNLOCKS, tries, 0.0))
+        return ops.where(mode == RELEASED, stops, moves)
     unlock = ops.where(mode == UNLOCKS, engaged, 0.0)
     lock = ops.where(mode == CLAMPS, 1.0 - engaged, 0.0)
     return ops.where(unlock + lock > 0.5, 1.0 - before, 0.0)

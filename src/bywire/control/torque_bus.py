@@ -14,7 +14,7 @@ from bywire.core.signals import Signal
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 Torque = Annotated[float, Signal("N*m", "torque on the bus", 300.0)]
 SLOTS = 10
-"""largest delay in sample times"""
+"""maximum delay in sample times"""
 
 
 class Parameters(ParameterSet):

@@ -112,7 +112,7 @@ def estimate_lag(
     most = int(np.ceil(reach / step))
     if not most >= 1 or a.size - most < _LEAST:
         overlap = f"leave an overlap of {_LEAST} steps in {a.size * step:g} s"
-        raise not_valid("largest", f"{reach:g} s", f"at least a step, {step:g} s, and {overlap}")
+        raise not_valid("largest", f"{reach:g} s", f"at least one step, {step:g} s, and {overlap}")
     rough = _coefficients(a, b, most)
     k = int(np.argmax(np.abs(rough)))
     shift, coefficient = _refined(a, b, k - most, float(np.sign(rough[k])))

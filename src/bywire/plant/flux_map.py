@@ -4,9 +4,9 @@ Both maps are the slopes of one potential, the coenergy W', which interpolates t
 
 .. math:: \psi_d = \frac{\partial W'}{\partial i_d}, \quad \psi_q = \frac{\partial W'}{\partial i_q}
 
-The cross slopes of the interpolated maps are therefore equal everywhere, and the magnetic energy
-does not depend on the path of the currents. The maps pass through all nodes of the tables. Between
-nodes, the coenergy is a polynomial of fifth order in each current, whose second derivatives are
+The cross inductances of the interpolated maps are therefore equal everywhere, and the magnetic
+energy does not depend on the path of the currents. The maps pass through all nodes of the tables.
+Between nodes, the coenergy is a polynomial of fifth order in each current, whose second derivatives
 continuous. Flux linkages and inductances therefore have no corners. Beyond the tables, inductances
 are constant.
 
@@ -41,7 +41,7 @@ Coenergy = Annotated[float, Signal("V*s*A", "coenergy", 1e-2)]
 SelfInductance = Annotated[float, Signal("H", "inductance", 1e-4), Gt(0)]
 
 ALLOWED = 0.02
-"""largest difference of the cross slopes, as a fraction of the mean inductance (chosen)"""
+"""maximum difference of the cross inductances, as a fraction of the mean inductance (chosen)"""
 
 
 class Parameters(ParameterSet):
@@ -177,8 +177,8 @@ def _require_equal_cross_slopes(par: Parameters) -> None:
     ):
         raise RuleError(
             "psi_d",
-            f"a table with a cross slope of {1e3 * max(map(abs, of_d.values())):.3g} mH",
-            "a table whose cross slopes are less than the mean of the own slopes",
+            f"a table with a cross inductance of {1e3 * max(map(abs, of_d.values())):.3g} mH",
+            "a table whose cross inductances are less than the mean of the self-inductances",
             "otherwise the magnetic energy is negative",
         )
 
@@ -276,7 +276,24 @@ def _sums(rises: list[float]) -> list[float]:
     return total
 
 
-def _derivatives(par: Parameters) -> tuple[tuple[Rows, Rows, Rows], ...]:
+_Orders = tuple[tuple[Rows, Rows, Rows], ...]
+_LATEST: list[tuple[Parameters, _Orders]] = []  # of the tables that were used last
+
+
+def _derivatives(par: Parameters) -> _Orders:
+    """Return the coenergy's derivatives at the nodes, which depend only on the tables.
+
+    An assembly evaluates the map dozens of times with the same tables, as symbols.
+    """
+    for known, orders in tuple(_LATEST):
+        if known is par:
+            return orders
+    orders = _computed(par)
+    _LATEST[:] = [*_LATEST[-1:], (par, orders)]
+    return orders
+
+
+def _computed(par: Parameters) -> _Orders:
     """Return the coenergy's derivatives at the nodes, by their orders in i_d and i_q.
 
     The coenergy is the mean of the integrals along both edges of the tables.

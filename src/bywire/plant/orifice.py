@@ -1,4 +1,4 @@
-"""Sharp-edged orifice for brake fluid, with turbulent flow that is laminar near zero."""
+"""Sharp-edged orifice for brake fluid: turbulent flow, and laminar flow near zero."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Piezoresistive sensor of absolute pressure, whose reading is a fraction of its span."""
+"""Piezoresistive absolute pressure sensor, with a reading that is a fraction of its span."""
 
 from __future__ import annotations
 

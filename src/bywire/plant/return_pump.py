@@ -50,7 +50,7 @@ class Parameters(ParameterSet):
     phase: Phase
     """angle of the eccentric at a shaft angle of 0; at angle 0, the chamber is largest"""
     V_dead: Volume
-    """smallest volume of the chamber"""
+    """minimum volume of the chamber"""
     V_gas: Volume
     """volume of gas bubbles in the chamber, at ambient pressure"""
     tau: ClosingTime

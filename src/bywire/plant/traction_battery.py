@@ -33,7 +33,7 @@ class Parameters(ParameterSet):
     law: Literal["constant", "cells"]
     """charging limit: constant, or from the cells"""
     P_max: ChargingPower
-    """largest charging power; 0 if the battery accepts none"""
+    """maximum charging power; 0 if the battery accepts none"""
     Q: Charge
     """charge of the full battery"""
     V_0: PackVoltage
@@ -41,17 +41,17 @@ class Parameters(ParameterSet):
     V_1: PackVoltage
     """open-circuit voltage of the full battery"""
     V_max: PackVoltage
-    """largest terminal voltage"""
+    """maximum terminal voltage"""
     R: PackResistance
     """internal resistance"""
     I_max: ChargingCurrent
-    """largest charging current of the warm battery"""
+    """maximum charging current of the warm battery"""
     T: Temperature
     """temperature of the cells"""
     T_cold: Temperature
     """temperature below which the battery accepts no charge"""
     T_warm: Temperature
-    """temperature above which it accepts the largest current"""
+    """temperature above which the battery accepts the maximum current"""
 
     @model_validator(mode="after")
     def _levels_rise(self) -> Parameters:
@@ -121,8 +121,8 @@ def balance(
 
 def charging_limit(
     x: State, par: Parameters
-) -> Annotated[float, Signal("W", "largest charging power", 25e3)]:
-    r"""Return the largest power that the battery accepts.
+) -> Annotated[float, Signal("W", "maximum charging power", 25e3)]:
+    r"""Return the maximum power that the battery accepts.
 
     With the law "cells":
 

@@ -36,15 +36,15 @@ class Parameters(ParameterSet):
     """Braking torque with a first-order lag; the motor's inertia belongs to the wheel."""
 
     T_max: MotorTorque
-    """largest torque at the wheel"""
+    """maximum torque at the wheel"""
     P_max: MotorPower
-    """largest power of the motor at the wheel"""
+    """maximum power of the motor at the wheel"""
     eta: Fraction
     """efficiency from the wheel to the battery"""
     v_1: FadeSpeed
-    """speed below which the torque fades"""
+    """speed below which the torque fades out"""
     v_2: FadeSpeed
-    """speed at which the torque has faded to zero"""
+    """speed at which the torque reaches zero"""
     tau: Duration
     """time constant of the torque"""
 
@@ -86,7 +86,7 @@ def balance(
 def limit(
     omega: WheelSpeed,
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)],
-    P_bat: Annotated[float, Signal("W", "largest charging power of the battery", 25e3), Ge(0)],
+    P_bat: Annotated[float, Signal("W", "maximum charging power of the battery", 25e3), Ge(0)],
     par: Parameters,
 ) -> Torque:
     r"""Return the largest braking torque at a speed.

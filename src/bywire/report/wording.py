@@ -23,15 +23,16 @@ def in_display_unit(value: F, symbol: str) -> tuple[F, str]:
     return convert(value, symbol, unit), unit
 
 
-def readable_units(symbol: str) -> str:
-    """Return all units in which figures of an SI unit are written, for any size.
+def readable_units(*symbols: str) -> str:
+    """Return all units in which figures of one or more SI units are written, for any size.
 
     Examples
     --------
-    >>> readable_units("m"), readable_units("Pa"), readable_units("ohm")
-    ('um, mm or m', 'Pa or bar', 'ohm')
+    >>> readable_units("m"), readable_units("ohm"), readable_units("A", "Pa")
+    ('um, mm or m', 'ohm', 'A, Pa or bar')
     """
-    *first, last = [unit for _, unit in BY_SIZE.get(symbol, ((0.0, display_unit(symbol)),))]
+    sizes = (BY_SIZE.get(symbol, ((0.0, display_unit(symbol)),)) for symbol in symbols)
+    *first, last = dict.fromkeys(unit for each in sizes for _, unit in each)
     return f"{', '.join(first)} or {last}" if first else last
 
 

@@ -175,7 +175,7 @@ def simulate_with_sensitivities(
     """
     if not parameters:
         raise ParameterError(
-            "sensitivities need at least one parameter in parameters",
+            "sensitivities need at least one parameter",
             name="parameters",
             valid="at least one parameter",
         )

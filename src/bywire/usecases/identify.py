@@ -196,8 +196,8 @@ def _asked(
         )
     if measurements or synthetic is not None:
         raise ParameterError(
-            f"{method} accepts only one of measurement files, {option('synthetic')} SEED, or "
-            f"{option('study')} COUNT",
+            f"{method} accepts only one of these: measurement files, {option('synthetic')} SEED, "
+            f"or {option('study')} COUNT",
             name=option("study"),
             value=str(study),
         )

@@ -45,16 +45,16 @@ FIGURES = Figures(
     motor_share=("%", "Energy at the motor relative to the energy at motor and friction brake."),
     largest_dip=(
         "%",
-        f"Largest lack of braking torque relative to the demand, from {_CALM:g} s after its ramp, "
-        "at speeds above 1 km/h, while slip control does not act.",
+        f"Maximum shortfall of the braking torque, relative to the demand, from {_CALM:g} s after "
+        "its ramp, at speeds above 1 km/h, while slip control is not active.",
     ),
     steady_error=(
         "%",
-        "Largest deviation of the braking torque from the demand in that time, where the motor's "
-        f"torque changes by at most {100 * _STEADY:g} % of the demand within {_CALM:g} s before "
-        "and after.",
+        "Maximum deviation of the braking torque from the demand in the same time, where the "
+        f"motor torque changes by at most {100 * _STEADY:g} % of the demand within {_CALM:g} s "
+        "before and after.",
     ),
-    peak_slip=("1", "Largest slip at speeds above 2.5 m/s."),
+    peak_slip=("1", "Maximum slip at speeds above 2.5 m/s."),
     charge=("1", "State of charge at the stop."),
 )
 
@@ -175,7 +175,7 @@ def blended_stop(name: str, vehicle: Blended, defaults: Mapping[str, Any]) -> Ex
     return Experiment(
         name=name,
         assembly=vehicle.model.name,
-        summary="stop from {v_0:km/h} with {T_demand}, shared by motor and friction brake",
+        summary="stop from {v_0:km/h} with {T_demand}, split between motor and friction brake",
         options=BlendedStopOptions,
         defaults=BlendedStopOptions(
             **{
@@ -241,12 +241,12 @@ def _deviations(
     if vehicle.acts:
         judged &= run[vehicle.acts].values < 0.5
     if not judged.any():
-        short = (math.nan, "the demand builds up, or slip control acts, until the stop")
+        short = (math.nan, "the demand builds up, or slip control is active, until the stop")
         return {"largest_dip": short, "steady_error": short}
     half = max(round(_CALM / float(np.median(np.diff(t)))), 1)
     around = sliding_window_view(np.pad(motor, half, mode="edge"), 2 * half + 1)
     steady = judged & (np.ptp(around, axis=1) <= _STEADY * whole)
-    never = (math.nan, "the motor's torque changes all the time")
+    never = (math.nan, "the motor torque changes all the time")
     return {
         "largest_dip": 100.0 * max(float(lack[judged].max()), 0.0) / whole,
         "steady_error": (

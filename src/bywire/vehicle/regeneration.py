@@ -40,9 +40,9 @@ class Parameters(ParameterSet):
     T_s: Duration
     """sample time"""
     t_ahead: TimeConstant
-    """time by which the law predicted looks ahead: delay of the bus and lag of the brake"""
+    """look-ahead time of the law "predicted": delay of the bus plus lag of the brake"""
     tau_a: TimeConstant
-    """time constant of the deceleration's filter, for the law predicted"""
+    """time constant of the deceleration filter (law "predicted")"""
 
     @model_validator(mode="after")
     def _bus_holds_the_delay(self) -> Parameters:
@@ -79,11 +79,14 @@ class Law(NamedTuple):
 def _on_the_bus(prefix: str, label: str) -> Any:
     """Return the memory of a bus, whose fields begin with a prefix."""
     make: Callable[..., Any] = NamedTuple
-    slot = Annotated[float, Signal("N*m", f"{label} on the bus", 300.0)]
+    slot = Annotated[float, Signal("N*m", f"{label}, in transit on the bus", 300.0)]
     return make("Bus", [(f"{prefix}_{name}", slot) for name in torque_bus.State._fields])
 
 
-_SENT, _REPORT = _on_the_bus("sent", "friction demand"), _on_the_bus("report", "motor torque")
+_SENT, _REPORT = (
+    _on_the_bus("sent", "demand on the friction brake"),
+    _on_the_bus("report", "motor torque"),
+)
 Memory: Any = joined(__name__, "Memory", Law, _SENT, _REPORT)
 """memory of the blending law and of the bus"""
 

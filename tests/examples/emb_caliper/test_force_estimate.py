@@ -80,7 +80,7 @@ def row(caliper: Path) -> Row:
 def test_wrong_properties_cost_accuracy(
     name: str, wrong: Any, fused: float, balance: float | None, row: Row
 ) -> None:
-    """The values are those of an independent simulation, in per cent of full scale."""
+    """The values are those of an independent simulation, in % of full scale."""
     figures = row(name, UNTRAINED, wrong)
     assert figures["rms_error"] <= 1.2 * fused
     if balance is not None:
@@ -140,6 +140,7 @@ def test_one_stroke_trains_the_estimate(
     changes = {} if theta_0 is None else {f"{ESTIMATOR}theta_0": theta_0}
     figures = row(name, {}, wrong, changes, law="strokes")
     assert figures["strokes"] == 2.0
+    assert abs(figures["contact_error"]) < 0.5
     assert figures["rms_curve"] <= 1.0
     assert figures["rms_error"] <= 1.0
     assert figures["error_max"] <= 2.0

@@ -20,7 +20,9 @@ NAMES = ("parking-screw", "parking-pawl")
 @pytest.fixture(scope="module")
 def runs(caliper: Path) -> dict[str, Any]:
     """Return a run of each brake on a hot disc."""
-    return {name: toolkit.run(toolkit.Bench("park", name, {}, {"hold": 400.0})) for name in NAMES}
+    return {
+        name: toolkit.run(toolkit.Bench("park-hot", name, {}, {"hold": 400.0})) for name in NAMES
+    }
 
 
 def figures(result: Any) -> dict[str, float]:
@@ -106,9 +108,9 @@ def test_a_pawl_holds_within_a_tooth(runs: Any) -> None:
     run = runs["parking-pawl"].recordings["run"]
     first = int(np.argmax(run["mode"].values == 2.0))
     theta = run["theta"].values[first : first + 1000]
-    assert 0.0 < theta.max() - theta[-1] < 2 * np.pi / 24
+    assert 0.0 <= theta.max() - theta[-1] < 2 * np.pi / 24
     assert np.ptp(theta[250:]) == 0.0
-    assert run["T_pawl"].values[first + 250] > 0.2
+    assert run["T_pawl"].values[first + 250] > 0.1
 
 
 @pytest.mark.parametrize(
@@ -123,7 +125,7 @@ def test_a_brake_that_cannot_release_or_hold_is_rejected(
     caliper: Path, name: str, changes: dict[str, Any], field: str, valid: str
 ) -> None:
     with raises(ParameterError, name=field, valid=valid):
-        toolkit.run(toolkit.Bench("park", name, changes))
+        toolkit.run(toolkit.Bench("park-hot", name, changes))
 
 
 def test_torques_of_the_specified_screw(caliper: Path) -> None:
@@ -132,3 +134,13 @@ def test_torques_of_the_specified_screw(caliper: Path) -> None:
     par = SCREW.parameters().screw
     assert lead_screw.apply_torque(20e3, par) == pytest.approx(18.94, rel=1e-3)
     assert lead_screw.release_torque(20e3, par) == pytest.approx(6.01, rel=1e-3)
+
+
+def test_a_weak_solenoid_leaves_the_brake_locked(caliper: Path) -> None:
+    changes = {"pawl.F_sol": 2.9}  # less than the spring
+    result = toolkit.run(toolkit.Bench("park-hot", "parking-pawl", changes, {"hold": 2.0}))
+    run = result.recordings["run"]
+    assert figures(result)["residual_force"] > 20e3
+    assert run["mode"].values[-1] == 3.0
+    assert result.warnings == []
+    assert run["i"].values[-1] == pytest.approx(0.0, abs=1e-6)  # the motor stops trying

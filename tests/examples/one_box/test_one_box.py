@@ -52,8 +52,9 @@ def test_the_pedal_sets_the_pressure(applied):
     assert not applied.warnings
 
 
-def test_the_application_meets_its_times():
-    assert bywire.run(FOLDER / "benches" / "apply.toml").status == "passed"
+@pytest.mark.parametrize("name", ["apply", "pressure_step", "wet_stop"])
+def test_benches_meet_their_requirements(name):
+    assert bywire.run(FOLDER / "benches" / f"{name}.toml").status == "passed"
 
 
 def test_energy_and_volume_of_an_application_are_balanced(applied):
@@ -69,10 +70,6 @@ def test_the_loops_are_stable_with_their_bandwidths():
     assert all(margins.stable for margins in loops.values())
     # The line to the other brakes hides a part of their volume at this frequency.
     assert loops["pressure"].crossover == pytest.approx(60.0 / (2.0 * math.pi), rel=0.1)
-
-
-def test_a_stop_on_a_wet_road_meets_its_requirements():
-    assert bywire.run(FOLDER / "benches" / "wet_stop.toml").status == "passed"
 
 
 def test_a_stop_without_anti_lock_control_locks_the_wheel():

@@ -82,7 +82,7 @@ _READING = {
     "drift": ("drifts at a constant rate", "rate"),
     "noise": ("has additional noise with a specified standard deviation", "offset"),
     "dropout": ("misses samples with a specified probability", "probability"),
-    "swapped": ("has the opposite sign", ""),
+    "swapped": ("has reversed polarity", ""),
 }
 _DRIVE = {
     "stuck": ("is stuck at a specified value", "level"),

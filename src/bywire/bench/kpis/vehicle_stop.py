@@ -87,13 +87,13 @@ def _first_standstill(t: Samples, v: Samples) -> float:
 
 @measure("m")
 def stopping_distance(stop: Stop, x: Samples) -> float | Undefined:
-    """Distance from time zero to the first standstill."""
+    """Distance from t = 0 to the first standstill."""
     return _distance(stop, x) if stop.does_stop else Undefined(_NO_STOP)
 
 
 @measure("s")
 def stopping_time(stop: Stop) -> float | Undefined:
-    """Time from time zero to the first standstill."""
+    """Time from t = 0 to the first standstill."""
     return stop.end if stop.does_stop else Undefined(_NO_STOP)
 
 

@@ -178,7 +178,7 @@ def _require_told(groups: Sequence[Group]) -> None:
         )
     if len({g.direction for g in groups}) < 2:
         raise ParameterError(
-            "F_0 and f need strokes in both directions, because only friction changes its sign. "
+            "F_0 and f need strokes in both directions, because only friction changes sign. "
             "Record strokes in both directions",
             name="F_0",
         )

@@ -101,8 +101,8 @@ def _table4(region: str) -> Iterator[Statement]:
         "%",
         f"{where}, eq. (22)",
         tolerance=ALLOWANCES["overshoot"],
-        note="peak of the step response minus its value after 4 s: the effect of the slow pair, "
-        "whose zero and pole have no counterpart",
+        note="peak of the step response minus its value after 4 s: the effect of the slow "
+        "zero-pole pair, to which no parameter of the brake corresponds",
     )
     yield Statement(f"table4.{region}.overshoot", overshoot)
 

@@ -491,7 +491,7 @@ def _at(par: Par, options: Options, f: float, demand: str = "") -> dict[str, flo
         "current": current,
         "inertia_share": float(np.abs(done.inertia).max()) / torque,
         "current_share": current / par.ecu.pressure.i_max,
-        # If no voltage is available at this current, the ratio would change its sign.
+        # If no voltage is available at this current, the ratio would change sign.
         "voltage_share": voltage if bool((done.available > 0).all()) else np.inf,
     }
 

@@ -260,8 +260,8 @@ def _require_reachable(par: Par, options: Options) -> None:
             "pressures",
             f"{largest / 1e5:g} bar",
             f"< {(highest - options.approach) / 1e5:.4g} bar",
-            f"because the piston reaches its end stop at {highest / 1e5:.4g} bar and must be "
-            f"free when it approaches from {options.approach / 1e5:g} bar above",
+            f"because the piston reaches its end stop at {highest / 1e5:.4g} bar and the "
+            f"approach from above starts {options.approach / 1e5:g} bar above the pressure",
         )
 
 

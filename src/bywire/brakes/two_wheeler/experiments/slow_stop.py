@@ -55,7 +55,7 @@ _QUIET = 1e-3  # m/s
 
 SLOW_FIGURES = Figures(
     undefined="the vehicle does not stop within the recording",
-    stopping_distance=("m", "Distance from time zero to the first standstill."),
+    stopping_distance=("m", "Distance from t = 0 to the first standstill."),
     stopping_time=("s", "Time until the first standstill."),
     rebound_speed=(
         "m/s",

@@ -1,4 +1,4 @@
-"""Stop of a quarter car whose motor and wedge brake share the demanded moment."""
+"""Stop of a quarter car in which motor and wedge brake share the demanded moment."""
 
 from __future__ import annotations
 

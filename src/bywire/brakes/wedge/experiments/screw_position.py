@@ -41,11 +41,11 @@ class StepsOptions(ParameterSet):
     """Steps of three amplitudes at a low and a high bandwidth."""
 
     a_small: SomeAngle
-    """smallest step"""
+    """minimum step"""
     a_medium: SomeAngle
     """middle step"""
     a_large: SomeAngle
-    """largest step"""
+    """maximum step"""
     f_low: Frequency
     """natural frequency of the low-bandwidth controller"""
     f_high: Frequency

@@ -1,6 +1,6 @@
 """Cogging torque of a motor from slow rotation both ways (Roberts 2003, section "Motor").
 
-Cogging depends on the angle and is the same in both directions; dry friction changes its sign.
+Cogging depends on the angle and is the same in both directions; dry friction changes sign.
 """
 
 from __future__ import annotations

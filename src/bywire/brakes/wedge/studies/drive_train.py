@@ -344,7 +344,7 @@ _ASSUMPTIONS = (
     "The controllers use the design's travel per shaft angle and moment per angle.",
     "Equal response means that all speeds and accelerations of the reference are scaled so that "
     "the pads close equally fast. With response 'enforced', they have a common factor. It is the "
-    "smallest factor at which the measured moment reaches 90 % of the demand in time at every "
+    "minimum factor at which the measured moment reaches 90 % of the demand in time at every "
     "friction coefficient.",
     "The bandwidths of the position loops on the shaft and the crossover of the moment loop are "
     "constant.",

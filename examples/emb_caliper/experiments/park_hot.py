@@ -1,4 +1,4 @@
-"""Park: clamp a hot disc, hold it without current while it cools, clamp again, and release."""
+"""Park hot: clamp a hot disc, hold it without current while it cools, clamp again, and release."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from bywire.authoring import (
     ParameterSet,
     Recordings,
     Stimulus,
+    quantities,
 )
-from bywire.control.parking import HOLDS
-from bywire.core.quantities import Temperature
+from bywire.control import parking
 from emb_caliper.models.parking import Parameters, ParkingBrake, released
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ KPIS = (
 class Options(ParameterSet):
     """Disc temperature and times."""
 
-    T_disc: Temperature
+    T_disc: quantities.Temperature
     """disc temperature when the brake is parked"""
     hold: Duration
     """time from the park demand to the release"""
@@ -82,18 +82,18 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     run = recordings["run"]
     time, F, mode = (run[name].values for name in ("time", "F_cl", "mode"))
     parked = time < options.hold - 1e-6
-    if not (parked & (mode == HOLDS)).any():
+    if not (parked & (mode == parking.HOLDS)).any():
         text = "the brake does not reach its force"
         return tuple(Kpi(name, float("nan"), unit, MEANINGS[name], text) for name, unit in KPIS)
-    off = int(np.argmax(mode == HOLDS))
+    off = int(np.argmax(mode == parking.HOLDS))
     rested = int(np.searchsorted(time, time[off] + 0.5))
     steady = F[parked & (time >= time[rested])]
-    travel = run["travel"].values[rested:][: round(10.0 / RECORD)]
+    after = parked & (time >= time[rested]) & (time <= time[rested] + 10.0)
     values = {
         "time_to_park": time[off],
         "first_force": F[rested],
         "least_force": steady.min(),
-        "creep": np.ptp(travel),
+        "creep": np.ptp(run["travel"].values[after]),
         "clamped_again": run["clamped"].values[parked][-1],
         "residual_force": F[-1],
         "energy": run["E_source"].values[-1],
@@ -102,7 +102,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 
 
 EXPERIMENT = Experiment(
-    name="park",
+    name="park-hot",
     assembly="emb-parking",
     summary="parking on a disc of {T_disc:degC}, which cools for {hold}",
     options=Options,
