@@ -184,7 +184,8 @@ def load_system(path: str | Path) -> Brake:
         missing = "" if place.exists() else " exist, so it does not"
         raise FileError(
             f"{path} does not{missing} declare a brake. Use a Python file, a folder with an "
-            "__init__.py, or a project with one such folder in src, that contains BRAKE = bywire.Brake(...)",
+            "__init__.py, or a project with one such folder in src, that contains BRAKE = "
+            "bywire.Brake(...)",
             name=str(path),
             valid="BRAKE = bywire.Brake(...)",
         )
