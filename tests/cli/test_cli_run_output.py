@@ -161,7 +161,10 @@ def test_a_file_comes_before_an_experiment_of_its_name(bywire, tmp_path, monkeyp
 
 
 def test_misspelled_experiment(bywire):
-    refused(bywire("run", "moment-pulse"), "did you mean moment-pulses?")
+    refused(
+        bywire("run", "moment-pulse"),
+        "did you mean moment-pulses? Names of your own brake or of an example need --system PATH",
+    )
 
 
 def test_what_a_run_did_instead_stands_above_its_key_figures(bywire, bench):

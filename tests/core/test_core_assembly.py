@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import pytest
 
@@ -342,3 +342,28 @@ def test_labels_name_outputs_too() -> None:
     part = Part(ball_screw_gear, output={"x": "x_mc"}, labels={"x": "plunger travel"})
     assert part.outputs()["x_mc"].label == "plunger travel"
     assert "x" not in {signal.label for signal in part.states().values()}
+
+
+class TwoMotors(Assembly[Any, Held]):
+    """Two motors with a loss each, and two stops that share theirs."""
+
+    name: ClassVar[str] = "two-motors"
+    Memory: ClassVar[Any] = Held
+    Stimulus: ClassVar[Any] = Held
+    first = Part(dc_motor, suffix="_1", which="drive", loss="E_1")
+    second = Part(dc_motor, suffix="_2", which="pump", loss="E_2")
+    low = Part(end_stop, work="W_low", loss="E_stops", which="low")
+    high = Part(end_stop, work="W_high", loss="E_stops", which="high")
+
+    def wire(self, w: Any) -> None:
+        """Connect nothing, because only the labels matter."""
+
+
+def test_an_energy_of_one_part_names_it_in_the_balance() -> None:
+    energies = signals_of(TwoMotors.Flow)
+    assert energies["E_2"].label == "copper loss, pump"
+    assert energies["E_2"].role == Role("sink", "copper, pump", split=True)
+    assert energies["W_high"].label.endswith(", high")
+    shared = signals_of(TwoMotors.Output)["E_stops"]
+    assert ", low" not in shared.label
+    assert ", high" not in shared.label

@@ -17,7 +17,8 @@ from bywire.bench.faults.injected import checked_sections
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, experiment_of, usual_set
 from bywire.bench.stimulus import STIMULI, stimulus_sections
 from bywire.core.arguments import checked
-from bywire.core.callers import option
+from bywire.core.brake import loaded_files
+from bywire.core.callers import is_command_line, option
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, UnknownNameError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
@@ -403,6 +404,9 @@ def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, s
     name = str(file)
     if not file.exists() and _NAME.fullmatch(name) and not names_experiment(name):
         text = f"there is no experiment and no bench file {quoted(name)}: {meant_by(file)}"
+        if is_command_line() and not loaded_files():
+            stop = "" if text.endswith("?") else "."
+            text += f"{stop} Names of your own brake or of an example need --system PATH"
         raise UnknownNameError(text, name="experiment", value=name)
     if file.is_file() or not names_experiment(name):
         return {}

@@ -10,6 +10,7 @@ without assemblies.
 from __future__ import annotations
 
 import types
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from itertools import chain, islice, repeat
@@ -605,10 +606,15 @@ def _gather(cls: type[Any]) -> None:
             states[name] = signal
     flows: dict[str, Signal] = {}
     shown: dict[str, Signal] = {}
+    owners = Counter(k for part in cls.parts.values() for k in part.energies | part.kept)
     for name, value in declared.items():
         if isinstance(value, Part):
-            flows |= {k: s for k, s in value.energies.items() if k not in flows}
-            shown |= value.outputs() | value.kept
+            energies, kept = (
+                {k: value.told_apart(s) if owners[k] == 1 else s for k, s in each.items()}
+                for each in (value.energies, value.kept)
+            )
+            flows |= {k: s for k, s in energies.items() if k not in flows}
+            shown |= value.outputs() | kept
         elif isinstance(value, Integral):
             flows[name] = value.signal
         elif isinstance(value, (Wire, Shown)):

@@ -69,7 +69,8 @@ class PartOptions(TypedDict, total=False):
     suffix
         Suffix of the state names, for a second part of the same kind, such as ``"_2"``.
     which
-        Words for this part in labels, such as ``"front"``. Default: the suffix.
+        Words for this part in labels, such as ``"front"``. Default: the suffix. An energy of this
+        part alone also has them in the energy balance.
     state
         Names of the states in the assembly, if they differ from the element's names.
     labels
@@ -163,8 +164,8 @@ class Part(Generic[X, U, F, P]):
     def __init__(self, element: Any, **options: Unpack[PartOptions]) -> None:
         self.element = element
         self.path, self.suffix = options.get("par", ""), options.get("suffix", "")
-        which = options.get("which", "")
-        self.ending = f", {which}" if which else self.suffix.replace("_", " ")
+        self.which = options.get("which", "")
+        self.ending = f", {self.which}" if self.which else self.suffix.replace("_", " ")
         self.renamed, self.labels = options.get("state", {}), options.get("labels", {})
         self.fixed, output = tuple(options.get("fixed", ())), options.get("output", ())
         self.output = dict(output) if isinstance(output, Mapping) else {k: k for k in output}
@@ -289,6 +290,15 @@ class Part(Generic[X, U, F, P]):
                 valid="Annotated[float, Signal('W', label)]",
             )
         return Signal("J", power.label, role=power.role)
+
+    def told_apart(self, energy: Signal) -> Signal:
+        """Return an energy of this part alone, with the part's words in its labels."""
+        if not self.which:
+            return energy
+        role = energy.role
+        if role is not None and role.label:
+            role = replace(role, label=f"{role.label}, {self.which}")
+        return replace(energy, label=f"{energy.label}, {self.which}", role=role)
 
     def group_sizes(self, par: Any) -> tuple[int, ...]:
         """Return the number of forces in each contact group; 0 if a choice omits the group.
