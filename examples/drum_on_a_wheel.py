@@ -20,7 +20,6 @@ from bywire.authoring import (
     Integral,
     ParameterSet,
     Part,
-    Role,
     Shown,
     Signal,
     Task,
@@ -29,10 +28,16 @@ from bywire.authoring import (
     derived,
 )
 from bywire.plant import drum, pressure_loop, road_wheel
-from bywire.vehicle import Corner, CornerParameters, WheelSpeed, rolling_states
+from bywire.vehicle import (
+    Corner,
+    CornerParameters,
+    RidingSpeed,
+    WheelSpeed,
+    rolling_states,
+    vehicle_sink,
+)
 
 DemandedPressure = Annotated[float, Unit("Pa", 3e6), Field(ge=0, allow_inf_nan=False)]
-RidingSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
@@ -60,10 +65,6 @@ class Memory(NamedTuple):
     p_ref: Annotated[float, Signal("Pa", "pressure set point", 3e6, set_point_of="p")]
 
 
-def _sink(label, returns):
-    return Role("sink", label, returns=returns, book="vehicle")
-
-
 class DrumOnAWheel(Corner[Parameters, Memory]):
     """A quarter car whose wheel has one dry friction: drum and rolling resistance."""
 
@@ -74,8 +75,8 @@ class DrumOnAWheel(Corner[Parameters, Memory]):
     turning = Part(road_wheel, par="wheel", outside=True)
     circuit = Part(pressure_loop)
     shoes = Part(drum, par="drum")
-    E_brake = Integral("J", "drum and rolling resistance", role=_sink("brake", ""))
-    E_wheel = Shown("J", "energy of the wheel", role=_sink("wheel", "any"))
+    E_brake = Integral("J", "drum and rolling resistance", role=vehicle_sink("brake"))
+    E_wheel = Shown("J", "energy of the wheel", role=vehicle_sink("wheel", "any"))
     torque = Shown("N*m", "brake torque", 500.0)
 
     def wheel(self, w):

@@ -186,7 +186,7 @@ Groups = dict[type[ParameterSet], tuple[ParameterSet, str]]
 def examples() -> Groups:
     """Return the first parameters of each class, and the set of bywire or an example with them."""
     groups: Groups = {}
-    for cited in (*PARAMETER_SETS.all().values(), *_sets_ofexamples()):
+    for cited in (*PARAMETER_SETS.all().values(), *_sets_of_examples()):
         _gather(cited.parameters(), cited.name, groups)
     return groups
 
@@ -198,7 +198,7 @@ def _gather(par: ParameterSet, name: str, groups: Groups) -> None:
             _gather(value, name, groups)
 
 
-def _sets_ofexamples() -> Iterator[CitedSet]:
+def _sets_of_examples() -> Iterator[CitedSet]:
     """Yield the parameter sets of the examples, without loading their brakes."""
     sys.path.insert(0, str(EXAMPLES))
     try:

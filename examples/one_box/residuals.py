@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bywire.authoring import Array, Residual
+from bywire.authoring import NEVER, Array, Residual
 
 ASSEMBLIES = ("one-box", "one-box-corner")
 _SETTLED = 0.2  # s after a change of the demand
@@ -19,10 +19,7 @@ def _held(signals: Signals, dt: float, values: Array) -> Array:
     p_ref, rows = signals["p_ref"], max(round(_SETTLED / dt), 1)
     before = np.concatenate((np.broadcast_to(p_ref[:, :1], (len(p_ref), rows)), p_ref), axis=1)
     is_held = np.abs(p_ref - before[:, : p_ref.shape[1]]) < 1.0
-    return np.where(is_held & (p_ref > 0.0), values, _NEVER)
-
-
-_NEVER = -1e9
+    return np.where(is_held & (p_ref > 0.0), values, NEVER)
 
 
 def _pressure(signals: Signals, par: Any, dt: float) -> Array:
@@ -49,7 +46,7 @@ def _torque(signals: Signals, par: Any, dt: float) -> Array:
 def _slip(signals: Signals, par: Any, dt: float) -> Array:
     """Return the slip above the speed at which anti-lock control fades out, otherwise none."""
     is_fast = signals["v_hat"] > par.antilock.rules.v_fall
-    return np.where(is_fast, np.abs(signals["slip_hat"]), _NEVER)
+    return np.where(is_fast, np.abs(signals["slip_hat"]), NEVER)
 
 
 RESIDUALS = (

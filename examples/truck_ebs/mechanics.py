@@ -18,7 +18,7 @@ from bywire.plant import (
     relay_valve,
     road_wheel,
 )
-from bywire.vehicle import Corner, WheelSpeed, rolling_states
+from bywire.vehicle import Corner, WheelSpeed, rolling_states, vehicle_sink
 from truck_ebs import ecu
 from truck_ebs.elements import push_rod
 from truck_ebs.parameters import TruckParameters
@@ -43,10 +43,6 @@ class Flow(NamedTuple):
     def minus(self, other: Flow | air_orifice.Output) -> Flow:
         """Return the difference of two flows."""
         return Flow(self.mdot - other.mdot, self.H - other.H)
-
-
-def _vehicle(label: str, returns: Any = "") -> Role:
-    return Role("sink", label, returns=returns, book="vehicle")
 
 
 class AirBrake(Assembly[ParT, MemoryT]):
@@ -195,8 +191,8 @@ class BrakedWheel(Corner[ParT, MemoryT], AirBrake[ParT, MemoryT]):
     frictions: ClassVar[tuple[str, ...]] = (*AirBrake.frictions, "omega")
 
     turning = Part(road_wheel, par="wheel", outside=True)
-    E_brake = Integral("J", "disc brake and rolling resistance", role=_vehicle("brake"))
-    E_wheel = Shown("J", "energy of the wheel", role=_vehicle("wheel", "any"))
+    E_brake = Integral("J", "disc brake and rolling resistance", role=vehicle_sink("brake"))
+    E_wheel = Shown("J", "energy of the wheel", role=vehicle_sink("wheel", "any"))
     torque = Shown("N*m", "brake torque", 5e3)
 
     def wheel(self, w: Any) -> WheelSpeed:

@@ -192,7 +192,7 @@ def test_nothing_can_be_assigned_or_added():
     [
         ({"inner.R": 0.0}, "inner.R = 0 ohm is not valid: it must be > 0 ohm"),
         ({"inner.R": math.nan}, "inner.R = nan is not valid: it must be > 0 ohm"),
-        ({"inner.R": math.inf}, "inner.R = inf is not valid: it must be > 0 ohm"),
+        ({"inner.R": math.inf}, "inner.R = inf is not valid: it must be finite and > 0 ohm"),
         ({"inner.R": "much"}, "inner.R = 'much' is not valid: it must be > 0 ohm"),
         ({"inner.R": None}, "inner.R = None is not valid: it must be > 0 ohm"),
         ({"share": 1.1}, "share = 1.1 is not valid: it must be > 0 and <= 1"),

@@ -139,3 +139,22 @@ def test_small_pressures_below_zero_are_not():
     values = recording["p_mc"].values.copy()
     values[recording["time"].values > 0.5] = -0.5e5
     assert model.watch(recording.assign({"p_mc": ("time", values)}), par) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "valid"),
+    [("inf", "finite and >= 0 W"), ("-1e3", ">= 0 kW"), ("nan", ">= 0 W")],
+)
+def test_blending_needs_a_battery_with_a_limit(value, valid):
+    electric = bywire.parameters("roberts2003-corner-electric")
+    limit = "regeneration.battery.P_max"
+    with pytest.raises(bywire.BywireError, match=f"{limit} = .* it must be {valid}$"):
+        electric.replace({limit: float(value)})
+
+
+def test_blending_without_a_battery_limit_is_rejected():
+    known = PARAMETER_SETS.all()["roberts2003-corner-electric"]
+    limit = "regeneration.battery.P_max"
+    values = {name: each for name, each in known.values.items() if name != limit}
+    with pytest.raises(bywire.BywireError, match=f"{limit} is missing. Add a value"):
+        replace(known, values=values).parameters()

@@ -4,19 +4,10 @@ import numpy as np
 import pytest
 
 from bywire.plant import accumulator, brake_fluid, check_valve, orifice, stiffening_caliper
+from systems import fluids
 
 BAR, CM3 = 1e5, 1e-6
-FLUID = brake_fluid.Parameters.create(
-    {
-        "beta": 1e12,  # incompressible
-        "nu": 12e-6,
-        "rho": 1070.0,
-        "air": "none",
-        "V_air": 0.0,
-        "n_air": 1.2,
-        "p_atm": 101_325.0,
-    }
-)
+FLUID = brake_fluid.Parameters.create(fluids.STIFF)
 INLET, OUTLET, RETURN = (
     orifice.Parameters.create({"d": d, "C_d": 0.65, "Re_cr": 100.0})
     for d in (0.5e-3, 0.6e-3, 1.2e-3)

@@ -30,6 +30,7 @@ from bywire.plant import (
     stiffening_caliper,
 )
 from bywire.simulation.run import Run, Trajectory, simulate
+from systems.fluids import RIGID, flat
 
 BAR, CM3 = 1e5, 1e-6
 P_MASTER = 120 * BAR
@@ -146,15 +147,7 @@ def parameters(changes: dict[str, Any] | None = None) -> Parameters:
         "store": {"p_0": 1.5 * BAR, "k": BAR / CM3, "V_max": 3.5 * CM3, "c_stop": 4e-15},
         "master": {"p_0": P_MASTER - 10.0, "k": 1e6, "V_max": 1e-3, "c_stop": 1e-12},
         "shaft": {"J": 1.0, "d": 0.0},
-        "fluid": {
-            "beta": 1e15,
-            "nu": 12e-6,
-            "rho": 1070.0,
-            "air": "none",
-            "V_air": 0.0,
-            "n_air": 1.2,
-            "p_atm": 101_325.0,
-        },
+        "fluid": RIGID,
     }
     for name, d, unpowered in (("inlet", 0.5e-3, "open"), ("outlet", 0.6e-3, "closed")):
         # A flat seat, whose opening is the lift relative to a quarter of the diameter
@@ -168,8 +161,7 @@ def parameters(changes: dict[str, Any] | None = None) -> Parameters:
             "low": 0.0,
             "high": 1.0,
         }
-    flat = {f"{g}.{name}": v for g, values in groups.items() for name, v in values.items()}
-    return Parameters.create(flat | {"T_s": 1e-3} | (changes or {}))
+    return Parameters.create(flat(groups) | {"T_s": 1e-3} | (changes or {}))
 
 
 def commands(t: float) -> tuple[bool, bool]:

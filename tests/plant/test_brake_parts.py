@@ -15,19 +15,10 @@ from bywire.plant import (
     stiffening_caliper,
 )
 from raising import raises
+from systems import fluids
 
 BAR = 1e5
-FLUID = brake_fluid.Parameters.create(
-    {
-        "beta": 1.5e9,
-        "nu": 12e-6,
-        "rho": 1070.0,
-        "air": "none",
-        "V_air": 0.0,
-        "n_air": 1.2,
-        "p_atm": 101_325.0,
-    }
-)
+FLUID = brake_fluid.Parameters.create(fluids.FLUID)
 CHAMBER = {
     "V_0": 0.55e-3,
     "x_table": (0.0, 0.043, 0.064),

@@ -9,20 +9,11 @@ from scipy.integrate import solve_ivp
 from bywire.core.errors import ParameterError
 from bywire.plant import brake_fluid, check_valve, orifice
 from raising import raises
+from systems import fluids
 
 BAR = 1e5
 LINE = 0.011e-6 / BAR  # linear compliance of a caliper, 0.011 cm^3/bar
-FLUID = brake_fluid.Parameters.create(
-    {
-        "beta": 1e12,
-        "nu": 12e-6,
-        "rho": 1070.0,
-        "air": "none",
-        "V_air": 0.0,
-        "n_air": 1.2,
-        "p_atm": 101_325.0,
-    }
-)
+FLUID = brake_fluid.Parameters.create(fluids.STIFF)
 
 
 def valve(d: float) -> orifice.Parameters:

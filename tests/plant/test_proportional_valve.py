@@ -19,6 +19,7 @@ from bywire.plant import (
 )
 from bywire.simulation.run import Run, Trajectory, simulate
 from raising import raises
+from systems.fluids import FLUID, flat
 
 BAR, CM3 = 1e5, 1e-6
 
@@ -109,18 +110,9 @@ def parameters(changes: dict[str, Any] | None = None) -> Parameters:
         "stop": {"k_stop": 2e5, "tau_stop": 2e-5},
         "caliper": {"V_1": 0.0, "p_1": 4 * BAR, "c": 0.011 * CM3 / BAR},
         "outlet": flow | {"d": 0.25e-3},
-        "fluid": {
-            "beta": 1.5e9,
-            "nu": 12e-6,
-            "rho": 1070.0,
-            "air": "none",
-            "V_air": 0.0,
-            "n_air": 1.2,
-            "p_atm": 101_325.0,
-        },
+        "fluid": FLUID,
     }
-    flat = {f"{g}.{name}": v for g, values in groups.items() for name, v in values.items()}
-    return Parameters.create(flat | {"T_s": 1e-3} | (changes or {}))
+    return Parameters.create(flat(groups) | {"T_s": 1e-3} | (changes or {}))
 
 
 def driven(

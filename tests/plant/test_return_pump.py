@@ -22,6 +22,7 @@ from bywire.authoring import (
 from bywire.core import ops
 from bywire.plant import accumulator, brake_fluid, dc_motor, orifice, return_pump, shaft
 from bywire.simulation.run import Run, Trajectory, simulate
+from systems.fluids import RIGID, flat
 
 BAR, CM3 = 1e5, 1e-6
 SEAT = {"seat.C_d": 0.65, "seat.Re_cr": 100.0}
@@ -39,15 +40,6 @@ PUMP = {
     "delivery.p_crack": 0.5 * BAR,
     "delivery.seat.d": 1.2e-3,
     **{f"{valve}.{name}": v for valve in ("suction", "delivery") for name, v in SEAT.items()},
-}
-FLUID = {
-    "beta": 1e15,
-    "nu": 12e-6,
-    "rho": 1070.0,
-    "air": "none",
-    "V_air": 0.0,
-    "n_air": 1.2,
-    "p_atm": 101_325.0,
 }
 STORE = {"p_0": 1.5 * BAR, "k": BAR / CM3, "V_max": 3.5 * CM3, "c_stop": 4e-15}
 
@@ -135,10 +127,9 @@ def parameters(changes: dict[str, Any] | None = None) -> Parameters:
         "low": STORE,
         "high": STORE | {"p_0": 40 * BAR, "k": 10 * BAR / CM3, "V_max": 10 * CM3},
         "orifice": {"d": 0.6e-3, "C_d": 0.65, "Re_cr": 100.0},
-        "fluid": FLUID,
+        "fluid": RIGID,
     }
-    flat = {f"{g}.{name}": v for g, values in groups.items() for name, v in values.items()}
-    return Parameters.create(flat | {"T_s": 1e-3} | (changes or {}))
+    return Parameters.create(flat(groups) | {"T_s": 1e-3} | (changes or {}))
 
 
 def pumped(
@@ -204,7 +195,7 @@ def test_a_starved_pump_does_not_create_fluid(opened):
         result = pumped(parameters(), step=step, opened=opened)
         assert missing(result) < 1e-9 * CM3
         assert result["void"].max() / return_pump.displacement(parameters().pump) > 0.99
-        assert result["p_low"].min() > -FLUID["p_atm"]
+        assert result["p_low"].min() > -RIGID["p_atm"]
         assert np.all(np.diff(result["E_pump"]) >= 0.0)
         assert np.ptp(result["V_low"][result.time > 0.95]) < 1e-6 * CM3
         residuals.append(residual(result))

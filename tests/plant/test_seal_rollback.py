@@ -11,6 +11,7 @@ from bywire.authoring import Assembly, Duration, Integral, ParameterSet, Part, R
 from bywire.core.quantities import Length
 from bywire.plant import brake_fluid, caliper_piston, end_stop, orifice, seal_rollback
 from bywire.simulation.run import Run, Trajectory, simulate
+from systems.fluids import FLUID, flat
 
 BAR, CM3 = 1e5, 1e-6
 A, K_PADS, GAP = 1.96e-3, 3.5e7, 1e-4
@@ -75,18 +76,9 @@ def parameters(changes: dict[str, Any] | None = None) -> Parameters:
         "seal": {"k": 6e5, "z_max": 3e-4},
         "pads": {"k_stop": K_PADS, "tau_stop": 2e-5},
         "line": {"d": 0.8e-3, "C_d": 0.65, "Re_cr": 100.0},
-        "fluid": {
-            "beta": 1.5e9,
-            "nu": 12e-6,
-            "rho": 1070.0,
-            "air": "none",
-            "V_air": 0.0,
-            "n_air": 1.2,
-            "p_atm": 101_325.0,
-        },
+        "fluid": FLUID,
     }
-    flat = {f"{g}.{name}": v for g, values in groups.items() for name, v in values.items()}
-    return Parameters.create(flat | {"gap": GAP, "T_s": 1e-3} | (changes or {}))
+    return Parameters.create(flat(groups) | {"gap": GAP, "T_s": 1e-3} | (changes or {}))
 
 
 def braked(par: Parameters, p: float, step: float = 2e-5, times: int = 2) -> Trajectory:

@@ -13,6 +13,7 @@ from bywire.core.errors import ParameterError
 from bywire.plant import brake_fluid, end_stop, orifice, solenoid_armature
 from bywire.simulation.run import Run, Trajectory, simulate
 from raising import raises
+from systems.fluids import FLUID, flat
 
 BAR = 1e5
 LOSSES = {"E_coil": "copper_loss", "E_armature": "damping_loss", "E_valve": "throttling"}
@@ -95,18 +96,9 @@ def parameters(changes: dict[str, Any] | None = None) -> Parameters:
         },
         "valve.seat": {"d": 0.6e-3, "C_d": 0.65, "Re_cr": 100.0},
         "stop": {"k_stop": 5e6, "tau_stop": 2.5e-5},
-        "fluid": {
-            "beta": 1.5e9,
-            "nu": 12e-6,
-            "rho": 1070.0,
-            "air": "none",
-            "V_air": 0.0,
-            "n_air": 1.2,
-            "p_atm": 101_325.0,
-        },
+        "fluid": FLUID,
     }
-    flat = {f"{g}.{name}": v for g, values in groups.items() for name, v in values.items()}
-    return Parameters.create(flat | {"T_s": 1e-4} | (changes or {}))
+    return Parameters.create(flat(groups) | {"T_s": 1e-4} | (changes or {}))
 
 
 def rest(par: Parameters) -> tuple[Any, Stimulus]:

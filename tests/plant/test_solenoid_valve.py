@@ -7,19 +7,10 @@ import pytest
 
 from bywire.core.errors import BywireError
 from bywire.plant import brake_fluid, orifice, solenoid_valve
+from systems import fluids
 
 BAR, H = 1e5, 20e-6
-FLUID = brake_fluid.Parameters.create(
-    {
-        "beta": 1e12,
-        "nu": 12e-6,
-        "rho": 1070.0,
-        "air": "none",
-        "V_air": 0.0,
-        "n_air": 1.2,
-        "p_atm": 101_325.0,
-    }
-)
+FLUID = brake_fluid.Parameters.create(fluids.STIFF)
 VALUES = {
     "seat.d": 0.5e-3,
     "seat.C_d": 0.65,

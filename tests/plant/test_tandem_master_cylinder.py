@@ -30,6 +30,7 @@ from bywire.plant import (
     tandem_master_cylinder,
 )
 from bywire.simulation.run import Run, Trajectory, simulate
+from systems.fluids import FLUID, flat
 
 BAR, CM3 = 1e5, 1e-6
 A = 0.25 * math.pi * 23.8e-3**2
@@ -168,18 +169,9 @@ def parameters(changes: dict[str, Any] | None = None) -> Parameters:
         "port_2": port,
         "line": {"d": 2e-3, "C_d": 0.65, "Re_cr": 100.0},
         "caliper": {"V_1": 0.35 * CM3, "p_1": 4 * BAR, "c": 0.011 * CM3 / BAR},
-        "fluid": {
-            "beta": 1.5e9,
-            "nu": 12e-6,
-            "rho": 1070.0,
-            "air": "none",
-            "V_air": 0.0,
-            "n_air": 1.2,
-            "p_atm": 101_325.0,
-        },
+        "fluid": FLUID,
     }
-    flat = {f"{g}.{name}": v for g, values in groups.items() for name, v in values.items()}
-    return Parameters.create(flat | {"T_s": 1e-3} | (changes or {}))
+    return Parameters.create(flat(groups) | {"T_s": 1e-3} | (changes or {}))
 
 
 def pressed(par: Parameters, step: float = 1e-5) -> Trajectory:

@@ -74,7 +74,7 @@ class Parameters(ParameterSet):
                 raise RuleError(
                     "screw.mu",
                     f"{self.screw.mu:g}",
-                    "smaller",
+                    f"smaller, or parking.F_park <= {F * most / load:.3g} kN",
                     f"the screw needs {load:.3g} N*m to {name} F_park = {F:g} kN, and the motor "
                     f"has {most:.3g} N*m",
                 )

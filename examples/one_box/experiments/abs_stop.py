@@ -21,10 +21,9 @@ from bywire.authoring import (
     Unit,
 )
 from bywire.plant import road
-from bywire.vehicle import ideal_corner_distance, surfaces
+from bywire.vehicle import RidingSpeed, ideal_corner_distance, surfaces
 from one_box.rigs.corner import OneBoxCorner, OneBoxCornerParameters, rolling
 
-RidingSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
 Demand = Annotated[float, Unit("Pa", 1e7), Field(gt=0, allow_inf_nan=False)]
 SLOW = 4.0
 """speed [m/s] below which the wheel may lock"""

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Self
 
-from bywire.authoring import Bounds, Integral, Part, Role, Shown, Task, zeros
+from bywire.authoring import Bounds, Integral, Part, Shown, Task, zeros
 from bywire.plant import brake_disc, road, road_wheel, wheel_encoder
-from bywire.vehicle import Corner, CornerParameters, WheelSpeed, rolling_states, slip_control
+from bywire.vehicle import (
+    Corner,
+    CornerParameters,
+    WheelSpeed,
+    rolling_states,
+    slip_control,
+    vehicle_sink,
+)
 from one_box import antilock
 from one_box.hydraulics import released_memory
 from one_box.laws import valve_pressure
 from one_box.modulator import Modulator, ModulatorParameters, modulator_parts
-
-
-def _vehicle(label: str, returns: Any = "") -> Role:
-    return Role("sink", label, returns=returns, book="vehicle")
 
 
 class OneBoxCornerParameters(ModulatorParameters):
@@ -52,8 +55,8 @@ class OneBoxCorner(Corner[OneBoxCornerParameters, Any], Modulator[OneBoxCornerPa
         state={"theta": "phi_w"},
         labels={"theta": "wheel angle"},
     )
-    E_brake = Integral("J", "disc brake and rolling resistance", role=_vehicle("brake"))
-    E_wheel = Shown("J", "energy of the wheel", role=_vehicle("wheel", "any"))
+    E_brake = Integral("J", "disc brake and rolling resistance", role=vehicle_sink("brake"))
+    E_wheel = Shown("J", "energy of the wheel", role=vehicle_sink("wheel", "any"))
     T_brake = Shown("N*m", "brake torque", 500.0)
 
     def wheel(self, w: Self) -> WheelSpeed:

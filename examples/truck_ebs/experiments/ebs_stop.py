@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Annotated, Any, cast
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
-from pydantic import Field
 
-from bywire.authoring import Case, Experiment, Figures, Kpi, Recordings, Unit
-from bywire.plant import adhesion, road
-from bywire.vehicle import CornerParameters, surfaces
+from bywire.authoring import Case, Experiment, Figures, Kpi, Recordings
+from bywire.plant import road
+from bywire.vehicle import CornerParameters, RidingSpeed, ideal_corner_distance, surfaces
 from truck_ebs import model
 from truck_ebs.experiments.ebs_response import DemandOptions, demanded
 from truck_ebs.models import abs as with_abs
 from truck_ebs.models import park
 from truck_ebs.parameters import AbsTruckParameters, ParkTruckParameters, TruckParameters
 
-RidingSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
 _SLOW = 2.0  # m/s, below which a wheel may lock
 FIGURES = Figures(
     undefined="the vehicle does not stop within the recording. Increase options.duration",
@@ -91,11 +89,9 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 
 
 def _ideal(v_0: float, run: xr.Dataset) -> float:
-    """Return the shortest stopping distance [m], with the tire at its peak from the demand on."""
+    """Return the shortest stopping distance [m] on this road."""
     corner = CornerParameters.model_validate(json.loads(run.attrs["parameters"])["corner"])
-    ground = road.surface(0.0, corner.road)
-    mu = adhesion.adhesion(adhesion.peak_slip(ground, corner.tyre), ground, corner.tyre)
-    return v_0**2 / (2.0 * corner.body.g * mu)
+    return ideal_corner_distance(v_0, corner)
 
 
 EXPERIMENT = Experiment(

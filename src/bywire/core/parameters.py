@@ -101,6 +101,8 @@ class Leaf:
             number = math.nan if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
         except (TypeError, ValueError, OverflowError):
             number = math.nan
+        if math.isinf(number) and self.bounds_text(str) and self.admits(number):
+            return quoted(value), f"finite and {self.range_text}"
         if not math.isfinite(number):
             return quoted(value), self.range_text
         unit = written_unit(text, symbol) or readable_unit(number, symbol)

@@ -18,7 +18,9 @@ DischargeCoefficient = Annotated[float, Unit("1", 0.65), Field(gt=0, le=1, allow
 CriticalReynolds = Annotated[float, Unit("1", 100.0), Field(gt=0, allow_inf_nan=False)]
 Opening = Annotated[float, Signal("1", "opened fraction of the area", 1.0, low=0.0, high=1.0)]
 Lift = Annotated[float, Signal("m", "lift of the cone", 1e-4, low=0.0)]
-HalfAngle = Annotated[float, Signal("rad", "half of the cone's angle", 0.8)]
+HalfAngle = Annotated[float, Unit("rad", 0.8), Field(gt=0, le=math.pi / 2, allow_inf_nan=False)]
+"""half of the angle of a cone that closes an orifice"""
+ConeAngle = Annotated[float, Signal("rad", "half of the cone's angle", 0.8)]
 Flow = Annotated[float, Signal("m**3/s", "flow", 1e-5)]
 Loss = Annotated[float, Signal("W", "throttling loss", role=Role("sink", "throttling"))]
 
@@ -50,7 +52,7 @@ def area(par: Parameters) -> Annotated[float, Signal("m**2", "area", 2e-7)]:
     return 0.25 * math.pi * par.d * par.d
 
 
-def conical_opening(x: Lift, alpha: HalfAngle, par: Parameters) -> Opening:
+def conical_opening(x: Lift, alpha: ConeAngle, par: Parameters) -> Opening:
     r"""Return the opened fraction of an orifice that a cone closes.
 
     .. math:: \frac{A(x)}{A} = \min\left(\frac{\pi d x \sin\alpha}{\pi d^2 / 4}, 1\right)

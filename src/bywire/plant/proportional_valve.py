@@ -21,7 +21,6 @@ oscillations.
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
@@ -35,7 +34,6 @@ from bywire.core.typing import Array
 from bywire.core.validity import first, outside, row_by_row
 from bywire.plant import brake_fluid, orifice
 
-HalfAngle = Annotated[float, Unit("rad", 0.8), Field(gt=0, le=math.pi / 2, allow_inf_nan=False)]
 ValveLift = Annotated[float, Unit("m", 2e-4), Field(gt=0, allow_inf_nan=False)]
 NeedleMass = Annotated[float, Unit("kg", 5e-3), Field(gt=0, allow_inf_nan=False)]
 SpringRate = Annotated[float, Unit("N/m", 1e3), Field(gt=0, allow_inf_nan=False)]
@@ -53,7 +51,7 @@ class Parameters(ParameterSet):
 
     seat: orifice.Parameters
     """orifice of the open valve, whose diameter is that of the seat"""
-    alpha: HalfAngle
+    alpha: orifice.HalfAngle
     """half of the cone's angle at the seat"""
     lift: ValveLift
     """lift of the needle at its stop"""

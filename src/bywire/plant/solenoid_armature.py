@@ -14,7 +14,6 @@ the ends `travel_ends`, whose load is an input.
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, model_validator
@@ -28,7 +27,6 @@ from bywire.core.typing import Array
 from bywire.core.validity import first, row_by_row
 from bywire.plant import brake_fluid, orifice
 
-HalfAngle = Annotated[float, Unit("rad", 0.8), Field(gt=0, le=math.pi / 2, allow_inf_nan=False)]
 Travel = Annotated[float, Unit("m", 2e-4), Field(gt=0, allow_inf_nan=False)]
 AirGap = Annotated[float, Unit("m", 1e-3), Field(gt=0, allow_inf_nan=False)]
 MagneticConstant = Annotated[float, Unit("N*m**2/A**2", 2e-7), Field(gt=0, allow_inf_nan=False)]
@@ -55,7 +53,7 @@ class Parameters(ParameterSet):
     """position without current"""
     seat: orifice.Parameters
     """orifice of the open valve, whose diameter is that of the seat"""
-    alpha: HalfAngle
+    alpha: orifice.HalfAngle
     """half of the cone's angle at the seat"""
     travel: Travel
     """travel of the armature from end to end"""

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Gt
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from bywire.core import ops
 from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet, RuleError
-from bywire.core.quantities import Duration, Length, TimeConstant, Unit, Weight
+from bywire.core.quantities import Duration, Length, TimeConstant, Weight
 from bywire.core.signals import Pressure, Signal
 from bywire.plant import brake_fluid, orifice
 
-HalfAngle = Annotated[float, Unit("rad", 0.8), Field(gt=0, le=math.pi / 2, allow_inf_nan=False)]
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 Switched = Annotated[float, Signal("1", "solenoid energized", 0.5, low=0.0, high=1.0)]
 
@@ -30,7 +28,7 @@ class Parameters(ParameterSet):
     """orifice of the open valve"""
     lift: Length
     """lift of the armature from seat to stop"""
-    alpha: HalfAngle
+    alpha: orifice.HalfAngle
     """half of the cone's angle at the seat"""
     t_delay: TimeConstant
     """time from a command to the first motion of the armature"""

@@ -11,7 +11,7 @@ from bywire.vehicle.corner import (
     rolling_states,
     warm_disc,
 )
-from bywire.vehicle.ideal_stop import ideal_corner_distance
+from bywire.vehicle.ideal_stop import RidingSpeed, ideal_corner_distance
 from bywire.vehicle.regeneration import RegeneratingCorner, RegeneratingTwoWheeler
 from bywire.vehicle.two_wheeler import (
     HotBrakes,
@@ -19,6 +19,7 @@ from bywire.vehicle.two_wheeler import (
     VehicleParameters,
     cold_start,
     rolling_start,
+    vehicle_sink,
 )
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "HotCornerParameters",
     "RegeneratingCorner",
     "RegeneratingTwoWheeler",
+    "RidingSpeed",
     "TwoWheeler",
     "VehicleParameters",
     "WheelSpeed",
@@ -39,5 +41,6 @@ __all__ = [
     "regeneration",
     "rolling_start",
     "rolling_states",
+    "vehicle_sink",
     "warm_disc",
 ]

@@ -15,7 +15,7 @@ from bywire.core.parts import Integral, Part, Shown, Wire
 from bywire.core.quantities import Length
 from bywire.core.signals import Role
 from bywire.plant import corner_body, disc_heat, road, tyre
-from bywire.vehicle.two_wheeler import BOOK, HEAT_BOOK, heat_sink, shown_slip
+from bywire.vehicle.two_wheeler import BOOK, HEAT_BOOK, heat_sink, shown_slip, vehicle_sink
 
 
 class CornerParameters(ParameterSet):
@@ -41,9 +41,7 @@ class Corner(Assembly[ParT, MemoryT]):
     corner = Part(corner_body, par="corner.body", outside=True, state={"v": "v_x"})
     tyre = Part(tyre, par="corner.tyre")
     road = Part(road, par="corner.road")
-    E_tyre = Integral(
-        "J", "tire: slip and deflection", role=Role("sink", "tire", book=BOOK, returns="taken")
-    )
+    E_tyre = Integral("J", "tire: slip and deflection", role=vehicle_sink("tire", "taken"))
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
     t_locked = Integral("s", "time during which the wheel is locked")
 
@@ -53,7 +51,7 @@ class Corner(Assembly[ParT, MemoryT]):
     slip = Shown("1", "braking slip", 0.1)
     sliding = Shown("1", "tire slides")
     a = Shown("m/s**2", "deceleration", 10.0)
-    E_body = Shown("J", "energy of the body", role=Role("sink", "body", book=BOOK, returns="any"))
+    E_body = Shown("J", "energy of the body", role=vehicle_sink("body", "any"))
 
     def wheel(self, w: Self) -> WheelSpeed:
         """Return the speed of the wheel."""
@@ -134,7 +132,7 @@ class HotCorner(Corner[ParT, MemoryT]):
     E_brake = Shown(
         "J",
         "energy that the brake removes from the wheel",
-        role=Role("sink", "brake", book=BOOK, returns="any"),
+        role=vehicle_sink("brake", "any"),
     )
 
     def braked(self, w: Self) -> float:

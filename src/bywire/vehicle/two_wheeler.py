@@ -8,7 +8,7 @@ every speed.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 from bywire.core import ops
 from bywire.core.assembly import Assembly, MemoryT, ParT
@@ -34,13 +34,9 @@ class VehicleParameters(ParameterSet):
     road: road.Parameters
 
 
-def _sink(label: str) -> Role:
-    return Role("sink", label, book=BOOK)
-
-
-def _tyre(label: str) -> Role:
-    """Return the role of a tire, whose deflection energy returns."""
-    return Role("sink", label, book=BOOK, returns="taken")
+def vehicle_sink(label: str, returns: Literal["", "taken", "any"] = "") -> Role:
+    """Return the role of a loss or a store in the vehicle's energy balance; see `Role`."""
+    return Role("sink", label, book=BOOK, returns=returns)
 
 
 class TwoWheeler(Assembly[ParT, MemoryT]):
@@ -62,11 +58,17 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     front_tyre = Part(tyre, par="vehicle.front_tyre", suffix="_f", which="front")
     rear_tyre = Part(tyre, par="vehicle.rear_tyre", suffix="_r", which="rear")
     road = Part(road, par="vehicle.road")
-    E_brake_f = Integral("J", "heat dissipated by the front brake", role=_sink("front brake"))
-    E_brake_r = Integral("J", "heat dissipated by the rear brake", role=_sink("rear brake"))
-    E_roll = Integral("J", "rolling resistance", role=_sink("rolling resistance"))
-    E_tyre_f = Integral("J", "front tire: slip and deflection", role=_tyre("front tire"))
-    E_tyre_r = Integral("J", "rear tire: slip and deflection", role=_tyre("rear tire"))
+    E_brake_f = Integral(
+        "J", "heat dissipated by the front brake", role=vehicle_sink("front brake")
+    )
+    E_brake_r = Integral("J", "heat dissipated by the rear brake", role=vehicle_sink("rear brake"))
+    E_roll = Integral("J", "rolling resistance", role=vehicle_sink("rolling resistance"))
+    E_tyre_f = Integral(
+        "J", "front tire: slip and deflection", role=vehicle_sink("front tire", "taken")
+    )
+    E_tyre_r = Integral(
+        "J", "rear tire: slip and deflection", role=vehicle_sink("rear tire", "taken")
+    )
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
     W_pitch = Integral(
         "J",
@@ -91,9 +93,7 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     mu_f = Shown("1", "front braking force relative to the wheel load")
     mu_r = Shown("1", "rear braking force relative to the wheel load")
     a = Shown("m/s**2", "deceleration", 10.0)
-    E_vehicle = Shown(
-        "J", "energy of the vehicle", role=Role("sink", "vehicle", book=BOOK, returns="any")
-    )
+    E_vehicle = Shown("J", "energy of the vehicle", role=vehicle_sink("vehicle", "any"))
 
     def brake_torques(self, w: Self) -> tuple[float, float]:
         """Return the torques that the front and the rear brake can hold [N m], >= 0."""
