@@ -98,7 +98,7 @@ EXPERIMENT = Experiment(
     name="ebs-stop",
     assembly="truck-ebs",
     variants=("truck-abs", "truck-park"),
-    summary="stop from {v_0:km/h} with {p_brake:bar} on {surface}",
+    summary="stop from {v_0:km/h} with {p_brake:bar} (surface: {surface})",
     options=Options,
     defaults=Options(v_0=80.0 / 3.6, p_brake=5e5, surface="own", duration=7.0),
     cases=cases,

@@ -181,9 +181,9 @@ def load_system(path: str | Path) -> Brake:
     place = place.parent if place.name == "__init__.py" else _package_of(place)
     source = place / "__init__.py" if place.is_dir() else place
     if not source.is_file() or source.suffix != ".py":
-        missing = "" if place.exists() else " exist, so it does not"
+        missing = "" if place.exists() else "does not exist, so it "
         raise FileError(
-            f"{path} does not{missing} declare a brake. Use a Python file, a folder with an "
+            f"{path} {missing}does not declare a brake. Use a Python file, a folder with an "
             "__init__.py, or a project with one such folder in src, that contains BRAKE = "
             "bywire.Brake(...)",
             name=str(path),
