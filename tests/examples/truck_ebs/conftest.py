@@ -1,4 +1,4 @@
-"""The truck's brake, loaded once for all tests of this folder."""
+"""The truck's brake, loaded for the tests of this folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from systems.loading import loaded
 FOLDER = Path(__file__).parents[3] / "examples" / "truck_ebs"
 
 
-@pytest.fixture(scope="package", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def brake():
     with loaded(FOLDER):
         yield
