@@ -22,9 +22,11 @@ def test_a_bench_says_its_own_options():
     asked = {"options.v_0": "60 km/h", "options.p_front": "30 bar", "options.surface": "snow"}
     options = {name.removeprefix("options."): value for name, value in asked.items()}
     bench = Bench("straight-stop", "sport600", options=options)
-    assert bench.summary() == ("panic stop from 60 km/h with 30 bar front and 40 bar rear, on snow")
+    assert bench.summary() == (
+        "panic stop from 60 km/h with 30 bar at the front and 40 bar at the rear, on snow"
+    )
     assert bench.definition.summary == (
-        "panic stop from 100 km/h with 40 bar front and 40 bar rear, on dry asphalt"
+        "panic stop from 100 km/h with 40 bar at the front and 40 bar at the rear, on dry asphalt"
     )
     several = bench.summary(["options.v_0", "vehicle.m"])
     assert several.startswith("panic stop from 60 km/h (varied) with 30 bar")

@@ -126,7 +126,7 @@ def test_wrong_values_are_refused(kind, changes, error, text):
     ("kind", "values", "text"),
     [
         ("step", {"start": 0, "end": 1}, "stimulus 'step': t_step is missing"),
-        ("table", {"times": [0, 1, 1], "values": [0, 1, 2], "between": "hold"}, "must increase"),
+        ("table", {"times": [0, 1, 1], "values": [0, 1, 2], "between": "hold"}, "1 s after 1 s"),
         ("table", {"times": [0, 1], "values": [0], "between": "hold"}, "the same length"),
         ("table", {"times": [], "values": [], "between": "hold"}, "the same length >= 1"),
         (

@@ -35,7 +35,7 @@ def test_elements_that_look_at_what_varies_are_silent_together(monkeypatch):
         lambda *of: given.append(silent_parts(*of)) or given[-1],
     )
     key_figures_of([changed(bench, {"motor.R_m": R, "fluid.nu": 1e-5 * R}) for R in (1.0, 1.1)])
-    assert given[-1] == {"line", "heat", "pressure_sensor", "current_sensor"}
+    assert given[-1] == {"chamber", "pads", "line", "heat", "pressure_sensor", "current_sensor"}
 
 
 def test_books_are_those_of_single_runs_though_rows_tell_their_ends_alone():

@@ -126,15 +126,15 @@ def test_every_slope_counts_where_the_step_is_judged(last, doubted):
 
 BAD = [
     ("", "", "n_table = 0 nodes must be of 2 nodes or more", "law = 'linear'"),
-    ("0 mm, 0.1 mm, 0.05 mm", "0 N, 1 kN, 2 kN", "n_table.2 = 5e-05 m", "> 0.0001 m"),
-    ("0 mm, 0.1 mm, 0.1 mm", "0 N, 1 kN, 2 kN", "n_table.2 = 0.0001 m", "> 0.0001 m"),
-    ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN, 2 kN", "F_table.2 = 2000 N", "> 3000 N"),
+    ("0 mm, 0.1 mm, 0.05 mm", "0 N, 1 kN, 2 kN", "n_table.2 = 50 um", "> 0.1 mm"),
+    ("0 mm, 0.1 mm, 0.1 mm", "0 N, 1 kN, 2 kN", "n_table.2 = 0.1 mm", "> 0.1 mm"),
+    ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN, 2 kN", "F_table.2 = 2 kN", "> 3 kN"),
     ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN, 3 kN", "F_table", "does not rise"),
     ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN", "n_table = 3 nodes", "F_table, 2 nodes"),
     ("0 mm, 0.1 mm", "", "n_table = 2 nodes", "F_table, 0 nodes"),
-    ("0.1 mm, 0.2 mm", "0 N, 3 kN", "n_table.0 = 0.0001 m", "0 m"),
+    ("0.1 mm, 0.2 mm", "0 N, 3 kN", "n_table.0 = 0.1 mm", "0 mm"),
     ("0 mm", "0 N", "n_table = 1 nodes", "2 nodes or more"),
-    ("0 mm, 0.1 mm", "0 N, -3 kN", "caliper.F_table.1 = -3000.0 N", ">= 0 N"),
+    ("0 mm, 0.1 mm", "0 N, -3 kN", "caliper.F_table.1 = -3 kN", ">= 0 kN"),
 ]
 
 

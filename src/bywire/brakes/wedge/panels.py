@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 from bywire.report.live_page.sliders import Sliders
@@ -80,7 +81,11 @@ ELECTRIC = Panels(
         ),
         CORNER.panels[1],
         Panel("charge", (Trace("soc"),)),
-        *CORNER.panels[2:],
+        replace(
+            CORNER.panels[2],
+            traces=tuple(each for each in CORNER.panels[2].traces if each.variable != "M_B"),
+        ),
+        *CORNER.panels[3:],
     ),
 )
 """as the corner, with the torques of motor and brake"""

@@ -209,11 +209,11 @@ def test_force_fight_grows_with_the_difference():
 @pytest.mark.parametrize(
     ("name", "overrides", "options", "fields"),
     [
-        ("stiffness", {"rig.sensor.K_F": 0.0}, {}, ("rig.sensor.K_F", "0.0 N/m")),
-        ("current-loop", {"rig.T_clamp": -1.0}, {}, ("rig.T_clamp", "-1.0 N*m")),
+        ("stiffness", {"rig.sensor.K_F": 0.0}, {}, ("rig.sensor.K_F", "0 N/m")),
+        ("current-loop", {"rig.T_clamp": -1.0}, {}, ("rig.T_clamp", "-1 N*m")),
         ("current-loop", {}, {"gains": (1.0, 2.0)}, ("gains",)),
-        ("screw-efficiency", {}, {"omega_slow": 0.0}, ("omega_slow", "0.0 rad/s")),
-        ("force-fight", {}, {"more_J": -1.0}, ("more_J", "-1.0")),
+        ("screw-efficiency", {}, {"omega_slow": 0.0}, ("omega_slow", "0 rad/s")),
+        ("force-fight", {}, {"more_J": -1.0}, ("more_J", "-1")),
         ("stiffness", {}, {"i_max": 25.0}, ("options.i_max", "25 A", "<= 20 A")),
     ],
 )
