@@ -31,7 +31,9 @@ def test_a_bench_says_its_own_options():
     several = bench.summary(["options.v_0", "vehicle.m"])
     assert several.startswith("panic stop from 60 km/h (varied) with 30 bar")
     friction = Bench("friction-sweep", "roberts2003", options={"mu_B": [0.3, 0.4]})
-    assert friction.summary().startswith("200 N·m steps at pad friction 0.3 to 0.4:")
+    assert friction.summary().startswith(
+        "200 N·m steps at pad friction coefficients of 0.3 to 0.4:"
+    )
 
 
 def test_reports_of_runs_and_studies_say_it_below_their_titles(tmp_path):

@@ -259,7 +259,7 @@ def _too_fast(opened: NDArray[np.float64], closed: NDArray[np.float64], step: fl
             swinging = omega[k][swings][0]
             texts[k] = (
                 f"a closed contact oscillates at {swinging / (2 * np.pi):.4g} Hz, too fast for "
-                f"steps of {shown(step, 's', 'us')}, so rebounds may be wrong. Use steps of at most "
-                f"{shown(SAFE / swinging, 's', 'us', 2)}, a softer contact, or more damping"
+                f"steps of {shown(step, 's', 'us')}, so rebounds may be wrong. Use steps of at "
+                f"most {shown(SAFE / swinging, 's', 'us', 2)}, a softer contact, or more damping"
             )
     return texts
