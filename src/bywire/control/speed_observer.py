@@ -47,7 +47,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, S
     .. math::
         \theta_p = \hat\theta + T \hat\omega, \quad e = \theta_{meas} - \theta_p, \quad
         \hat\theta = \theta_p + (1 - z^2) e, \quad
-        \hat\omega \mathrel{+}= \frac{(1 - z)^2}{T} e, \quad z = e^{-\omega_o T}
+        \hat\omega \leftarrow \hat\omega + \frac{(1 - z)^2}{T} e, \quad z = e^{-\omega_o T}
 
     Notes
     -----

@@ -27,8 +27,7 @@ class Parameters(ParameterSet):
     T_hot: AbsoluteTemperature
     """temperature above which wear increases"""
     T_act: Activation
-    """activation energy divided by the gas constant, which determines the wear increase above
-    T_hot"""
+    """activation energy divided by the gas constant; it determines the wear above T_hot"""
     n_pads: Count
     """number of pads that share the work"""
     A_pad: Area

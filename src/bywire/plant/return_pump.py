@@ -261,7 +261,7 @@ def power_loss(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameter
 
     Notes
     -----
-    It contains the power of the set-valued load, F |omega|. In an assembly, the actual power is
+    It contains the power of the set-valued load, ``F * |omega|``. In an assembly, the actual power is
     that of the reaction on the shaft. To balance the energy exactly, add the difference,
     ``-reaction * omega - F * |omega|``, to the loss of the part.
     """
