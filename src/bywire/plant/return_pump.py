@@ -261,8 +261,8 @@ def power_loss(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameter
 
     Notes
     -----
-    It contains the power of the set-valued load, ``F * |omega|``. In an assembly, the actual power is
-    that of the reaction on the shaft. To balance the energy exactly, add the difference,
+    It contains the power of the set-valued load, ``F * |omega|``. In an assembly, the actual power
+    is that of the reaction on the shaft. To balance the energy exactly, add the difference,
     ``-reaction * omega - F * |omega|``, to the loss of the part.
     """
     opens = growth(u, par) - balance(x, u, par, fluid)
