@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bywire.core import brake as registry
+from bywire.core import registry as kinds
 from bywire.core.brake import Brake, load_system
 
 SPRING_AXIS = Path(__file__).with_name("spring_axis.py")
@@ -26,6 +27,9 @@ def forgotten() -> Iterator[None]:
         for name in list(sys.modules):
             if name.partition(".")[0] in roots:
                 del sys.modules[name]
+        if roots:  # a brake that is loaded again is equal, but its things are not
+            for cached in (kinds._found, kinds._gathered, kinds._declared):
+                cached.cache_clear()
 
 
 @contextmanager
