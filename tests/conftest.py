@@ -14,6 +14,15 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(1_000_000, 10, 10)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def forgotten_brakes() -> Iterator[None]:
+    """Forget the brakes that a file's tests load, because other files' tests share the process."""
+    from systems.loading import forgotten
+
+    with forgotten():
+        yield
+
+
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     """Yield a browser; without one, tests that ask for it say that they are skipped, and why."""

@@ -11,6 +11,7 @@ import pytest
 import bywire
 from bywire.contracts.element_contracts import demands_on
 from bywire.contracts.elements import LAWS, every_element
+from bywire.core import registry
 from bywire.core.registry import Kind
 
 ELEMENTS = every_element()
@@ -43,6 +44,7 @@ def test_new_file_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     (tmp_path / "new_element.py").write_text("def output(x):\n    return x\n", encoding="utf-8")
     monkeypatch.setitem(sys.modules, package.__name__, package)
     monkeypatch.delitem(sys.modules, "some_elements.new_element", raising=False)
+    monkeypatch.setattr(registry, "_KINDS", [*registry._KINDS])  # the new kind is forgotten
     (element,) = Kind("element", (), LAWS.read, "some_elements").all().values()
     assert list(element.functions) == ["output"]
     refused = [demand.settle() for demand in demands_on(element)]
