@@ -374,7 +374,7 @@ def write(folder: Path) -> None:
 
 
 def lines(element: ModuleType) -> list[str]:
-    """Return the figure of an element's page, as reStructuredText; nothing if there is none."""
+    """Return the figure of an element's page, as reStructuredText; empty without a figure."""
     home, _, name = element.__name__.rpartition(".")
     if home != plant.__name__ or name not in FIGURES:
         return []

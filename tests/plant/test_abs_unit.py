@@ -30,7 +30,7 @@ from bywire.plant import (
     stiffening_caliper,
 )
 from bywire.simulation.run import Run, Trajectory, simulate
-from systems.fluids import RIGID, flat
+from systems.fluids import PUMP, RIGID, flat
 
 BAR, CM3 = 1e5, 1e-6
 P_MASTER = 120 * BAR
@@ -125,22 +125,8 @@ def _given(w: Any) -> Any:
 def parameters(changes: dict[str, Any] | None = None) -> Parameters:
     """Return the anti-lock unit of `test_abs_cycle`, with the pump of `test_return_pump`."""
     flow = {"C_d": 0.65, "Re_cr": 100.0}
-    pump = {
-        "d_p": 6.5e-3,
-        "e": 1e-3,
-        "phase": math.pi / 2,
-        "V_dead": 2e-8,
-        "V_gas": 0.0,
-        "tau": 5e-5,
-        "G_back": 0.0,
-        "p_max": 250 * BAR,
-        "suction.p_crack": 0.2 * BAR,
-        "delivery.p_crack": 0.0,
-    }
     groups: dict[str, dict[str, Any]] = {
-        "pump": pump,
-        "pump.suction.seat": flow | {"d": 2.5e-3},
-        "pump.delivery.seat": flow | {"d": 1.2e-3},
+        "pump": PUMP | {"delivery.p_crack": 0.0},
         "check": {"p_crack": 0.0},
         "check.seat": flow | {"d": 1.2e-3},
         "caliper": {"V_1": 0.35 * CM3, "p_1": 4 * BAR, "c": 0.011 * CM3 / BAR},

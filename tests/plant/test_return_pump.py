@@ -22,25 +22,10 @@ from bywire.authoring import (
 from bywire.core import ops
 from bywire.plant import accumulator, brake_fluid, dc_motor, orifice, return_pump, shaft
 from bywire.simulation.run import Run, Trajectory, simulate
-from systems.fluids import RIGID, flat
+from systems.fluids import PUMP, RIGID, flat
 
 BAR, CM3 = 1e5, 1e-6
 SEAT = {"seat.C_d": 0.65, "seat.Re_cr": 100.0}
-PUMP = {
-    "d_p": 6.5e-3,
-    "e": 1e-3,
-    "phase": math.pi / 2,
-    "V_dead": 2e-8,
-    "V_gas": 0.0,
-    "tau": 5e-5,
-    "G_back": 0.0,
-    "p_max": 250 * BAR,
-    "suction.p_crack": 0.2 * BAR,
-    "suction.seat.d": 2.5e-3,
-    "delivery.p_crack": 0.5 * BAR,
-    "delivery.seat.d": 1.2e-3,
-    **{f"{valve}.{name}": v for valve in ("suction", "delivery") for name, v in SEAT.items()},
-}
 STORE = {"p_0": 1.5 * BAR, "k": BAR / CM3, "V_max": 3.5 * CM3, "c_stop": 4e-15}
 
 

@@ -297,8 +297,7 @@ def period_of(frequencies: Sequence[float], intervals: Sequence[float], step: fl
         if abs(count - round(count)) > 1e-6 * count:
             raise ParameterError(
                 f"a period of 1/({f:g} Hz) = {shown(1.0 / f, 's')} is not a multiple of the step "
-                "of "
-                f"{shown(step, 's')}. Use a frequency that divides the sample rate",
+                f"of {shown(step, 's')}. Use a frequency that divides the sample rate",
                 name="frequency",
                 value=f"{f:g} Hz",
             )

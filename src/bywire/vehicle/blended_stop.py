@@ -99,7 +99,7 @@ class Blended:
     v, place, slip
         Recorded speed, distance and slip.
     acts
-        Recorded activity of slip control; empty if there is none.
+        Recorded activity of slip control; empty without slip control.
     demand
         Stimulus of the pedal.
     unit

@@ -58,7 +58,7 @@ class Corner(Assembly[ParT, MemoryT]):
         raise NotImplementedError
 
     def motor_torque(self, w: Self) -> float:
-        """Return the braking torque of a motor at the wheel [N m]; by default, there is none."""
+        """Return the braking torque of a motor at the wheel [N m]; 0 by default."""
         return 0.0
 
     def tyre_torque(self, w: Self) -> float:

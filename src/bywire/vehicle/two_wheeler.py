@@ -100,7 +100,7 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         raise NotImplementedError
 
     def motor_torques(self, w: Self) -> tuple[float, float]:
-        """Return the braking torques of motors at both wheels [N m]; by default, there is none."""
+        """Return the braking torques of motors at both wheels [N m]; 0 by default."""
         return 0.0, 0.0
 
     def wire(self, w: Self) -> None:

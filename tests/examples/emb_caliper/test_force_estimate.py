@@ -366,12 +366,17 @@ def test_the_brakes_campaign_is_listed(command: Callable[..., tuple[int, str, st
     assert "emb-caliper-pmsm" in out
 
 
-def test_the_tolerance_study_meets_its_requirements(
+def test_almost_all_brakes_of_the_tolerance_study_keep_the_limits(
     caliper: Path, command: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:
     text = (caliper / "studies" / "force_estimate.toml").read_text(encoding="utf-8")
     study = tmp_path / "force.toml"
     study.write_text(text.replace("cases = 256", "cases = 64"), encoding="utf-8")
     code, out, err = command("study", "run", study, "--out", tmp_path / "out", "--json")
-    assert code in (0, 1), err
-    assert "rms_error" in out
+    assert code == 1, err  # 64 cases leave a probability of 95 % undecided
+    found = json.loads(out)
+    assert (found["cases"], found["failed"]) == (64, 0)
+    assert {each["kpi"]: each["met"] for each in found["requirements"]} == {
+        "rms_error": 63,
+        "error_99": 63,
+    }
