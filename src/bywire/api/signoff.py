@@ -29,7 +29,7 @@ from bywire.report.document import (
 )
 from bywire.report.tables import OUTCOMES as OUTCOME_CELLS
 from bywire.report.tables import Cell, Column, Table, text_table
-from bywire.report.wording import amount, clean, measured_amount
+from bywire.report.wording import amount, beside_limit, clean, measured_amount
 from bywire.signoff.earlier import RECORD
 from bywire.signoff.judging import Judged, judge_limit
 from bywire.signoff.junit import TestCase, junit_xml
@@ -521,7 +521,14 @@ def _value(judged: Judged) -> str:
         return "-"
     if _is_in_decibel(judged):
         return f"{_decibel(judged.value):.4g} dB"
-    return measured_amount(judged.value, judged.unit, judged.error)
+    value, error, unit = _beside_limit(judged)
+    return measured_amount(value, unit, error)
+
+
+def _beside_limit(judged: Judged) -> tuple[float | None, float, str]:
+    """Return value, error and unit: in percent where the limit is in percent."""
+    limit = judged.limit.partition(" with ")[0]
+    return beside_limit(judged.value, judged.error, judged.unit, limit)
 
 
 def _is_in_decibel(judged: Judged) -> bool:
@@ -535,7 +542,8 @@ def _decibel(factor: float) -> float:
 def _error(judged: Judged) -> str:
     if not judged.unit or not math.isfinite(judged.error) or math.isnan(judged.value):
         return "-"
-    return amount(judged.error, difference_unit(judged.unit), 2, like=_size(judged))
+    value, error, unit = _beside_limit(judged)
+    return amount(error, difference_unit(unit), 2, like=_finite(value))
 
 
 def _room(judged: Judged) -> str:
@@ -546,12 +554,14 @@ def _room(judged: Judged) -> str:
         bound = judged.value - judged.room if is_least else judged.value + judged.room
         room = _decibel(judged.value) - _decibel(bound)
         return f"{room if is_least else -room:.3g} dB"
-    return amount(judged.room, difference_unit(judged.unit), 3, like=_size(judged))
+    value, _, unit = _beside_limit(judged)
+    room = judged.room * (100.0 if unit != judged.unit else 1.0)
+    return amount(room, difference_unit(unit), 3, like=_finite(value))
 
 
-def _size(judged: Judged) -> float | None:
+def _finite(value: float | None) -> float | None:
     """Return the value if it determines the unit of the numbers beside it."""
-    return judged.value if math.isfinite(judged.value) else None
+    return value if value is not None and math.isfinite(value) else None
 
 
 def _shortened(text: str) -> str:

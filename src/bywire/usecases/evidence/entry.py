@@ -115,10 +115,7 @@ def read_figure_limit(
     if figure not in figures:
         raise unknown_name("key figure in limit", figure, figures)
     limit = text[text.index(figure) + len(figure) :].strip()
-    unit = figures[figure]
-    if unit == "1" and "%" in limit.partition(" with ")[0]:
-        unit = "%"
-    return read_limit(figure, limit, unit, "limit", has_probability=has_probability)
+    return read_limit(figure, limit, figures[figure], "limit", has_probability=has_probability)
 
 
 def require_file(path: Any) -> None:
