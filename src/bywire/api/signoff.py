@@ -401,7 +401,7 @@ class SignOff(Answer):
     @cached_property
     def changes(self) -> list[str]:
         """Changes since the earlier sign-off: texts, verdicts and computations."""
-        return list(_changes(self.previous, self._data())) if self.previous else []
+        return list(_changes(self.previous, self._verdicts_data())) if self.previous else []
 
     def _reproducibility(self) -> list[Block]:
         rows = [
@@ -435,23 +435,23 @@ class SignOff(Answer):
                 each: sum(v.outcome == each for v in self.requirements)
                 for each in reversed(OUTCOMES)
             },
-            "requirements": [_verdict_data(each) for each in self.requirements],
-            "assumptions": [
-                _verdict_data(self.verdicts[each.id]) for each in self.plan.assumptions
-            ],
+            **self._verdicts_data(),
             "evidence_without_requirement": [
                 _shown_data(one) for one in self._shown if not one.evidence.shows
             ],
             "warnings": self.warnings,
             "since": self.compared_with,
-            "changes": list(self.__dict__.get("changes", ())),
+            "changes": self.changes,
             "bywire": __version__,
         }
 
-    def as_object(self) -> dict[str, Any]:
-        """Return the JSON object of the document."""
-        self.changes  # noqa: B018 - so that the data contain them
-        return super().as_object()
+    def _verdicts_data(self) -> dict[str, Any]:
+        return {
+            "requirements": [_verdict_data(each) for each in self.requirements],
+            "assumptions": [
+                _verdict_data(self.verdicts[each.id]) for each in self.plan.assumptions
+            ],
+        }
 
     def _write_junit(self, path: Path) -> Path:
         cases = [

@@ -219,7 +219,7 @@ def _together(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
             other = first.setdefault(task.shelf, replace(each, task=task))
             if other.task.digest != task.digest:
                 raise ParameterError(
-                    f"this is the same computation as in {other.place}, with other settings. Use "
+                    f"[[evidence]] repeats the computation of {other.place} with other settings. Use "
                     "the same settings in both, or remove one of them",
                     name="[[evidence]]",
                     value=task.title,

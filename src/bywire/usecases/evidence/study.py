@@ -183,7 +183,7 @@ def read_study_task(subject: str, arguments: Mapping[str, Any], folder: Path) ->
                 "key of [[evidence]] study", name, (*KEYS, "shows", "limit", "note")
             )
     asked = {name: value_of(known[name], value, folder) for name, value in arguments.items()}
-    file = Path(there(subject, folder))
+    file = Path(there(subject, None, folder))
     require_file(file)
     changes = asked.get("set", {})
     plan = read_study(file, changes)
