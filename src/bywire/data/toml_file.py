@@ -111,15 +111,28 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
 
 # --- Kinds of files
 
-BENCH, STUDY, LIFE, CAMPAIGN = "bench", "study", "life", "campaign"
+BENCH, STUDY, LIFE, CAMPAIGN, PROCEDURE = "bench", "study", "life", "campaign", "procedure"
 _COMMANDS = {
     BENCH: "bywire run",
     STUDY: "bywire study run",
     LIFE: "bywire life",
     CAMPAIGN: "bywire faults",
+    PROCEDURE: "bywire procedure",
 }
-_WORDS = {BENCH: "a bench", STUDY: "a study", LIFE: "a life", CAMPAIGN: "a fault campaign"}
-HEADS = {BENCH: "experiment", STUDY: "bench", LIFE: "life", CAMPAIGN: "bench"}
+_WORDS = {
+    BENCH: "a bench",
+    STUDY: "a study",
+    LIFE: "a life",
+    CAMPAIGN: "a fault campaign",
+    PROCEDURE: "a procedure",
+}
+HEADS = {
+    BENCH: "experiment",
+    STUDY: "bench",
+    LIFE: "life",
+    CAMPAIGN: "bench",
+    PROCEDURE: "procedure",
+}
 """required key of each kind"""
 _OF_CAMPAIGNS = ("campaign", "criteria")
 _NEVER_IN_STUDIES = {*_OF_CAMPAIGNS, "values", "residuals", "rates", "reaction"}
@@ -137,6 +150,8 @@ def kind_of(content: Mapping[str, Any]) -> str:
     keys = content.keys()
     if "life" in keys:
         return LIFE
+    if "procedure" in keys:
+        return PROCEDURE
     if "bench" not in keys:
         return BENCH if "experiment" in keys else ""
     if not keys & _NEVER_IN_STUDIES:
@@ -161,7 +176,7 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     content
         Content of the file.
     wanted
-        `BENCH`, `STUDY`, `LIFE` or `CAMPAIGN`.
+        `BENCH`, `STUDY`, `LIFE`, `CAMPAIGN` or `PROCEDURE`.
     file
         Path of the file.
 
@@ -172,8 +187,9 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     """
     kind = kind_of(content)
     head = HEADS[wanted]
-    if not kind or kind == wanted or (head in content and head != HEADS[kind]):
-        return
+    has_head = head in content and head != HEADS[kind] if kind else False
+    if not kind or kind == wanted or (has_head and kind != PROCEDURE):
+        return  # a procedure also names an experiment, like a bench
     raise ParameterError(
         f"this is {_WORDS[kind]}, not {_WORDS[wanted]}. Use '{_COMMANDS[kind]} {file}'",
         name=str(file),
