@@ -7,6 +7,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.core.units import difference_unit, unit_text
@@ -202,6 +204,7 @@ class ProcedureResult(Answer):
             part.state_name("T_disc"): (part.which or name).strip(", ")
             for name, part in motion.brakes.items()
         }
+        none = np.zeros(0)
         return temperature_figure(
             [
                 [
@@ -209,6 +212,8 @@ class ProcedureResult(Answer):
                         stop.begin,
                         stop.course["time"],
                         {label: stop.course[name] for name, label in labels.items()},
+                        np.asarray(stop.pause.get("time", ())),
+                        {label: stop.pause.get(name, none) for name, label in labels.items()},
                     )
                     for stop in group
                 ]
@@ -220,12 +225,12 @@ class ProcedureResult(Answer):
         return [
             (
                 f"{stop.plan.name} {_numbered(stop)}: {each.kpi}",
-                100.0 * each.value / each.required.bound,
+                100.0 * _used_part(each),
                 each.outcome,
             )
             for stop in self.stops
             for each in stop.verdicts
-            if math.isfinite(each.value) and each.required.bound
+            if each.unit != "K" and each.value > 0.0 and each.required.bound > 0.0
         ]
 
     def _drawn_limits(self) -> Figure:
@@ -258,7 +263,8 @@ _HEAT_CAPTION = (
     "Each panel shows stops that heat each other's brakes."
 )
 _LIMIT_CAPTION = (
-    "Values relative to their limits (dashed line). For a lower limit, values above 100 % meet it."
+    "Used part of each limit: the value over an upper limit, or a lower limit over the value. Bars "
+    "beyond the dotted line miss their limit."
 )
 
 
@@ -280,6 +286,12 @@ def _kpi_cell(stop: Stop, name: str) -> Cell:
     if kpi is None or not math.isfinite(kpi.value) or (is_partial and name in _OF_STANDSTILL):
         return Cell("-")
     return amount_cell(kpi.value, kpi.unit)
+
+
+def _used_part(verdict: Verdict) -> float:
+    """Return the value over an upper limit, or a lower limit over the value."""
+    share = verdict.value / verdict.required.bound
+    return share if verdict.required.is_upper else 1.0 / share
 
 
 def _margin_cell(verdict: Verdict) -> Cell:

@@ -36,7 +36,7 @@ FIGURES = Figures(
     disc_before=("K", "Temperature of the hottest disc at the start of the stop."),
     disc_after=("K", "Temperature of the hottest disc at the end of the stop."),
 )
-"""key figures of every stop of a procedure, besides those of its experiment"""
+"""key figures of every stop of a procedure, in addition to those of its experiment"""
 _NO_LIFT = "the rear wheel stays on the ground"
 
 

@@ -23,7 +23,7 @@ from bywire.core.parameters import leaf_fields
 from bywire.core.section import Hint, Name, Section, Table
 from bywire.core.units import parse, shown
 from bywire.core.values import written
-from bywire.data.toml_file import PROCEDURE, read_toml, require_kind
+from bywire.data.toml_file import PROCEDURE, entry_lines, read_toml, require_kind
 from bywire.procedures.formula import SpeedLimit, read_speed_limit
 from bywire.procedures.motion import SPEED, Motion
 
@@ -220,14 +220,18 @@ def read_procedure(
     """
     file = Path(source)
     content = read_toml(file, "procedure file")
+    lines = entry_lines(file).get("stops", [])
     try:
         require_kind(content, PROCEDURE, file)
-        return _plan(ProcedureFile.read(content, "a procedure file"), file.stem, overrides)
+        read = ProcedureFile.read(content, "a procedure file")
+        return _plan(read, file.stem, overrides, lines)
     except InputError as error:
         raise error.reworded(f"{file}: {error}") from None
 
 
-def _plan(file: ProcedureFile, name: str, overrides: Mapping[str, str]) -> ProcedurePlan:
+def _plan(
+    file: ProcedureFile, name: str, overrides: Mapping[str, str], lines: Sequence[int]
+) -> ProcedurePlan:
     numbers = _numbers(file.numbers, overrides)
     known = {each.name: each.value for each in numbers}
     v_max = _positive(overrides.get(MAXIMUM, file.v_max), "m/s", MAXIMUM, 50.0)
@@ -263,8 +267,9 @@ def _plan(file: ProcedureFile, name: str, overrides: Mapping[str, str]) -> Proce
         raise ParameterError("a procedure needs at least one [[stops]]", name="stops")
     reader = _Reader(file, shared, known, v_max, bench)
     stops: list[StopPlan] = []
-    for section in file.stops:
-        stops.append(reader.stop(section, stops))
+    for k, section in enumerate(file.stops):
+        line = f" (line {lines[k]})" if k < len(lines) else ""
+        stops.append(reader.stop(section, stops, line))
     if any(each.T_brake is not None or each.interval is not None for each in stops):
         stops = reader.warmed(stops)
     return ProcedurePlan(
@@ -367,9 +372,9 @@ class _Reader:
     v_max: float
     bench: Bench
 
-    def stop(self, section: StopSection, before: Sequence[StopPlan]) -> StopPlan:
-        """Return the plan of a section's stops."""
-        where = f"[[stops]] {quoted(section.name)}"
+    def stop(self, section: StopSection, before: Sequence[StopPlan], line: str) -> StopPlan:
+        """Return the plan of a section's stops; ``line``: its line in errors."""
+        where = f"[[stops]] {quoted(section.name)}{line}"
         if section.name in {each.name for each in before}:
             raise ParameterError(
                 f"{where} occurs twice. Give each entry of [[stops]] its own name",

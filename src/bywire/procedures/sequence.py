@@ -25,6 +25,7 @@ Heat = Mapping[str, disc_heat.State]
 """temperatures of the brakes by part"""
 _ADJUSTMENTS = 20  # maximum number of runs that adjust the demand
 _CLOSE = 1e-3  # relative deviation at which the deceleration counts as reached
+_ROWS = 30  # of an interval
 NOT_SHOWN = "not shown"
 """outcome of a limit for which a number is missing"""
 
@@ -72,7 +73,9 @@ class Stop:
     begin
         Time at which the stop begins [s], from the first stop that heats it on.
     course
-        Times [s], speeds [m/s] and disc temperatures [K] by name, until the stop ends.
+        Times from then on [s], speeds [m/s] and disc temperatures [K] by name, until the stop ends.
+    pause
+        Times [s] and disc temperatures [K] of the interval before the stop; empty without one.
     """
 
     plan: StopPlan
@@ -84,6 +87,7 @@ class Stop:
     warnings: tuple[str, ...] = ()
     begin: float = 0.0
     course: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    pause: Mapping[str, Array] = field(default_factory=dict, repr=False)
 
     def kpi(self, name: str) -> Kpi | None:
         """Return a key figure by name; None if the stop was not run or has no such figure."""
@@ -203,12 +207,12 @@ class _Stops:
         scale, adjusted = 1.0, None
         repeats = 1 if plan.interval is None else plan.count
         for k in range(repeats):
-            heat, begin = self._start(state, k)
+            heat, begin, pause = self._start(state, k)
             if plan.deceleration is not None and (k == 0 or plan.adjusts_every):
                 scale, adjusted = self._adjusted(heat, scale, k)
             stop, left, length = self._stop(heat, begin, scale, k, adjusted)
             adjusted = None
-            made.append(stop)
+            made.append(replace(stop, pause=pause))
             state.heat, state.begin, state.length = left, begin, length
             state.is_known = True
             progress(plan.name, (done + k + 1) / total)
@@ -221,16 +225,17 @@ class _Stops:
         assert self.plan.motion is not None
         return self.plan.motion
 
-    def _start(self, state: _Thread, k: int) -> tuple[Heat, float]:
-        """Return the temperatures and the time at the start of a stop."""
+    def _start(self, state: _Thread, k: int) -> tuple[Heat, float, Mapping[str, Array]]:
+        """Return the temperatures and the time at the start of a stop, and the interval before."""
         plan = self.plan
         assert plan.bench is not None
         laws = self._motion.laws(plan.bench.par)
         air = {name: disc_heat.State(law.T_a, law.T_a, law.T_a) for name, law in laws.items()}
         if plan.T_brake is not None and (k == 0 or plan.interval is None):
-            return {name: each._replace(T_disc=plan.T_brake) for name, each in air.items()}, 0.0
+            warm = {name: each._replace(T_disc=plan.T_brake) for name, each in air.items()}
+            return warm, 0.0, {}
         if plan.interval is None or state.heat is None:
-            return air, 0.0
+            return air, 0.0, {}
         pause = plan.interval - state.length
         if not pause > 0.0:
             raise ParameterError(
@@ -240,18 +245,21 @@ class _Stops:
                 value=shown(plan.interval, "s"),
                 valid=f"> {shown(state.length, 's')}",
             )
-        heat = {
-            name: disc_heat.State(
-                **{
-                    key: float(y[-1])
-                    for key, y in cooled(
-                        state.heat[name], law, plan.cooling_speed, np.array([0.0, pause])
-                    ).items()
-                }
-            )
-            for name, law in laws.items()
+        t = np.linspace(0.0, pause, _ROWS)
+        courses = {
+            name: cooled(state.heat[name], law, plan.cooling_speed, t) for name, law in laws.items()
         }
-        return heat, state.begin + plan.interval
+        heat = {
+            name: disc_heat.State(**{key: float(T[-1]) for key, T in each.items()})
+            for name, each in courses.items()
+        }
+        discs = {self._disc(name): each["T_disc"] for name, each in courses.items()}
+        begin = state.begin + plan.interval
+        return heat, begin, {"time": state.begin + state.length + t, **discs}
+
+    def _disc(self, name: str) -> str:
+        """Return the signal of a brake's disc temperature."""
+        return self._motion.brakes[name].state_name("T_disc")
 
     def _bench(self, heat: Heat, scale: float) -> StopBench:
         plan = self.plan
@@ -339,7 +347,7 @@ class _Stops:
         course = {"time": t[kept], motion.v: v[kept]}
         left: dict[str, disc_heat.State] = {}
         for name, each in motion.temperatures(rows).items():
-            course[motion.brakes[name].state_name("T_disc")] = each["T_disc"][kept]
+            course[self._disc(name)] = each["T_disc"][kept]
             left[name] = disc_heat.State(*(float(each[key][last]) for key in each))
         return course, left
 
