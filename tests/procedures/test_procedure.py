@@ -15,6 +15,7 @@ from bywire.procedures import cooling
 from bywire.procedures.motion import Motion
 from bywire.procedures.procedure_file import read_procedure
 from bywire.procedures.sequence import NOT_SHOWN, run_stops
+from bywire.usecases.evidence.readers import READERS
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = sorted([*ROOT.glob("procedures/*.toml"), *ROOT.glob("examples/*/procedures/*.toml")])
@@ -293,6 +294,20 @@ def one_box():
     bywire.load_system(ROOT / "examples/one_box")
 
 
+def test_a_procedure_is_evidence_that_changes_with_its_content(plan_of, tmp_path):
+    def task_of(text):
+        plan_of(text)
+        return READERS["procedure"]("trial.toml", {}, tmp_path)
+
+    task = task_of(HEAD + STOP)
+    assert task.limit("mfdd >= 4 m/s^2").unit == "m/s**2"
+    with pytest.raises(InputError, match="'mfdd'"):
+        task.limit("mfd >= 4 m/s^2")
+    assert task_of(f"# remark\n{HEAD}{STOP}").digest == task.digest
+    for old, new in (("V^2/115", "V^2/116"), ("60 km/h", "61 km/h")):
+        assert task_of((HEAD + STOP).replace(old, new)).digest != task.digest
+
+
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
 def test_shipped_procedures_cite_every_number(file, one_box):
     plan = read_procedure(file)
@@ -306,7 +321,8 @@ def test_the_result_has_a_page_json_and_a_verdict(tmp_path, plan_of):
     plan_of(HEAD + STOP)
     result = bywire.run_procedure(tmp_path / "trial.toml", estimate_error=False)
     facts = result.as_object()
-    assert (facts["status"], result.holds) == ("passed", True)
+    assert (facts["status"], result.holds, result.outcome) == ("passed", True, "met")
+    assert result.key_figures[0].at == "cold 1"
     (stop,) = facts["stops"]
     assert stop["requirements"][0]["limit"] == "<= 37.3043 m"
     assert stop["conditions"]["v_0"] == pytest.approx(60.0 / 3.6)

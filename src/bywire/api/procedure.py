@@ -14,7 +14,7 @@ from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.core.units import difference_unit, unit_text
 from bywire.procedures.procedure_file import StopPlan
 from bywire.procedures.sequence import NOT_SHOWN, NotShown, Procedure, Stop
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, FigureAt, Outcome, outcome_of
 from bywire.report.document import (
     Banner,
     Block,
@@ -66,6 +66,21 @@ class ProcedureResult(Answer):
     def holds(self) -> bool:
         """Whether every limit is met; a limit without a verdict is not."""
         return self.status == "passed"
+
+    @property
+    def outcome(self) -> Outcome:
+        """Worst verdict on the limits; ``not shown`` without any."""
+        judged = [each.outcome for each in self.procedure.verdicts]
+        return outcome_of([*judged, *(each.outcome for each in self.procedure.gaps)])
+
+    @property
+    def key_figures(self) -> list[FigureAt]:
+        """Key figures of every stop."""
+        return [
+            FigureAt(kpi, f"{stop.plan.name} {_numbered(stop)}")
+            for stop in self.stops
+            for kpi in stop.kpis
+        ]
 
     @property
     def stops(self) -> tuple[Stop, ...]:

@@ -17,6 +17,7 @@ from pydantic import Field
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.bench.computation import bench_identity, functions_digest
 from bywire.bench.kpis.kpi import Figures
 from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
@@ -150,6 +151,28 @@ class StopPlan:
     unknown: tuple[tuple[str, str, str], ...] = ()
 
     @property
+    def identity(self) -> dict[str, Any]:
+        """Everything that affects its key figures and verdicts, except earlier stops."""
+        conditions = (
+            "name",
+            "v_0",
+            "until",
+            "count",
+            "interval",
+            "cooling_speed",
+            "T_brake",
+            "deceleration",
+            "adjusts_every",
+            "lacking",
+            "unknown",
+        )
+        return {
+            "bench": None if self.bench is None else bench_identity(self.bench),
+            "limits": [[each.figure, each.text] for each in self.limits],
+            **{name: getattr(self, name) for name in conditions},
+        }
+
+    @property
     def follows(self) -> bool:
         """Whether the first stop begins with the heat of the previous stops."""
         return self.interval is not None and self.T_brake is None
@@ -186,6 +209,25 @@ class ProcedurePlan:
     stops: tuple[StopPlan, ...]
     numbers: tuple[Number, ...] = ()
     missing: tuple[str, ...] = ()
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every key figure of its stops by name."""
+        units = dict(self.demand_figures.units)
+        for each in self.stops:
+            if each.bench is not None and each.motion is not None:
+                units |= each.bench.definition.kpis_with(each.bench.chosen_options)
+                units |= each.motion.units
+        return units
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Everything that affects its key figures and verdicts."""
+        return {
+            "computed": functions_digest((), "bywire.procedures"),
+            "stops": [each.identity for each in self.stops],
+            "demand": list(self.demand),
+        }
 
     @property
     def demand_figures(self) -> Figures:
