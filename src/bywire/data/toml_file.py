@@ -142,12 +142,14 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
 
 # --- Kinds of files
 
-BENCH, STUDY, LIFE, CAMPAIGN, SIGNOFF = "bench", "study", "life", "campaign", "sign-off"
+BENCH, STUDY, LIFE, CAMPAIGN = "bench", "study", "life", "campaign"
+PROCEDURE, SIGNOFF = "procedure", "sign-off"
 _COMMANDS = {
     BENCH: "bywire run",
     STUDY: "bywire study run",
     LIFE: "bywire life",
     CAMPAIGN: "bywire faults",
+    PROCEDURE: "bywire procedure",
     SIGNOFF: "bywire signoff",
 }
 _WORDS = {
@@ -155,6 +157,7 @@ _WORDS = {
     STUDY: "a study",
     LIFE: "a life",
     CAMPAIGN: "a fault campaign",
+    PROCEDURE: "a procedure",
     SIGNOFF: "a sign-off",
 }
 HEADS = {
@@ -162,6 +165,7 @@ HEADS = {
     STUDY: "bench",
     LIFE: "life",
     CAMPAIGN: "bench",
+    PROCEDURE: "procedure",
     SIGNOFF: "requirement",
 }
 """required key of each kind"""
@@ -183,6 +187,8 @@ def kind_of(content: Mapping[str, Any]) -> str:
         return SIGNOFF
     if "life" in keys:
         return LIFE
+    if "procedure" in keys:
+        return PROCEDURE
     if "bench" not in keys:
         return BENCH if "experiment" in keys else ""
     if not keys & _NEVER_IN_STUDIES:
@@ -207,7 +213,7 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     content
         Content of the file.
     wanted
-        `BENCH`, `STUDY`, `LIFE`, `CAMPAIGN` or `SIGNOFF`.
+        `BENCH`, `STUDY`, `LIFE`, `CAMPAIGN`, `PROCEDURE` or `SIGNOFF`.
     file
         Path of the file.
 
@@ -218,8 +224,9 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     """
     kind = kind_of(content)
     head = HEADS[wanted]
-    if not kind or kind == wanted or (head in content and head != HEADS[kind]):
-        return
+    has_head = head in content and head != HEADS[kind] if kind else False
+    if not kind or kind == wanted or (has_head and kind != PROCEDURE):
+        return  # a procedure also names an experiment, like a bench
     raise ParameterError(
         f"this is {_WORDS[kind]}, not {_WORDS[wanted]}. Use '{_COMMANDS[kind]} {file}'",
         name=str(file),
