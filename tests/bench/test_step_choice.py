@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import bywire
+from bywire.bench import step_choice
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import bench_text, read
 from bywire.bench.running import run
@@ -72,8 +73,9 @@ def test_contacts_rule_out_a_step_that_the_key_figures_permit() -> None:
     assert not run(chosen).warnings
 
 
-def test_an_error_that_no_step_reaches() -> None:
+def test_an_error_that_no_step_reaches(monkeypatch: pytest.MonkeyPatch) -> None:
     """State the figure, the error that was reached, and what to type."""
+    monkeypatch.setattr(step_choice, "FINEST", 20e-6)
     with pytest.raises(StepError, match=r"0\.0001 % cannot be reached.*overshoot|steady") as raised:
         with_chosen_step(Bench("hard-braking", requirements=LIMITED, error="0.0001 %"))
     assert '"simulation.error": "0.0' in str(raised.value)

@@ -285,7 +285,7 @@ def tested_line(plan: StudyPlan) -> str:
 def tested_brief(nominal: Result, plan: StudyPlan) -> list[Block]:
     """Return faults and varied quantities for a terminal."""
     names = ", ".join(each.name for each in plan.varied)
-    faults = fault_texts(nominal.bench, nominal.recordings)
+    faults = [*choice_texts(nominal.bench), *fault_texts(nominal.bench, nominal.recordings)]
     listed = Listing([*faults, *([f"varied: {names}"] if names else [])])
     return [listed, Details("", [Listing(varied_texts(plan.varied))])]
 
@@ -307,7 +307,7 @@ def tested_section(nominal: Result, source: StudiedBench | None, subject: Subjec
     subject
         The bench with its changes.
     """
-    faults = fault_texts(nominal.bench, nominal.recordings)
+    faults = [*choice_texts(nominal.bench), *fault_texts(nominal.bench, nominal.recordings)]
     blocks: list[Block] = [Paragraph(f"{_source_text(source)}.")] if source is not None else []
     blocks += [Listing(faults)] if faults else []
     blocks += [subject.changes_block, _options_in_use(nominal.bench)]

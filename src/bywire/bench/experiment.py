@@ -214,12 +214,7 @@ class Case:
             multiple is much longer than the run, or no step is chosen yet (NaN).
         """
         if math.isnan(step):
-            raise StepError(
-                "simulation.error is not possible here, because this command does not choose a "
-                f"step. Type {option('overrides', {'simulation.step': '20us'})}",
-                name="simulation.error",
-                valid="simulation.step",
-            )
+            raise without_step("this command does not choose a step")
         record = self.record if interval is None else interval
         periods = tuple((task.name, task.period) for task in self.model.tasks(self.par))
         settle = _settling(self.settle, self.duration, periods, step, record)
@@ -504,6 +499,16 @@ def two_steps(step: str, error: str) -> StepError:
         name="simulation.error",
         value=error,
         valid="simulation.step or simulation.error",
+    )
+
+
+def without_step(reason: str) -> StepError:
+    """Return the error for a stated numerical error for which no step is chosen."""
+    return StepError(
+        f"simulation.error is not possible here, because {reason}. Type "
+        f"{option('overrides', {'simulation.step': '20us'})}",
+        name="simulation.error",
+        valid="simulation.step",
     )
 
 

@@ -90,7 +90,7 @@ def _chosen(trials: _Trials, progress: Progress | None) -> dict[str, Any]:
         if progress is not None:
             progress(f"error with steps of {shown(step, 's', 'us')}", k / len(steps))
         try:
-            trial = trials.at(step)
+            trial = trials.confirmed(step, stated)
         except RunError as error:
             failure = error
             continue
@@ -113,6 +113,8 @@ def _chosen(trials: _Trials, progress: Progress | None) -> dict[str, Any]:
 def spread_over(values: Sequence[Any], most: int = 16) -> list[Any]:
     """Return at most a number of values, evenly spread from the first one to the last one."""
     count = min(most, len(values))
+    if not count:
+        return []
     places = np.unique(np.linspace(0.0, len(values) - 1.0, count).round().astype(int))
     return [values[k] for k in places.tolist()]
 
@@ -142,8 +144,8 @@ def _exceeded(stated: float, errors: Mapping[str, float]) -> str:
 
 
 def percent_text(error: float) -> str:
-    """Return an estimated error in percent with one digit."""
-    return f"{100.0 * error:.1g} %" if math.isfinite(error) else "unknown"
+    """Return an estimated error in percent with two digits."""
+    return f"{100.0 * error:.2g} %" if math.isfinite(error) else "unknown"
 
 
 def _intervals(bench: Bench) -> set[float]:
@@ -335,7 +337,7 @@ def errors_of(
                 bound = 0.0
             elif units[name] == "s":  # a time read at a row is accurate to one row with any step
                 bound = max(bound - reading_error(value, intervals), 0.0)
-            each[k] = bound / scale if bound else bound
+            each[k] = bound / scale if 0.0 < bound < math.inf else bound
             if bound and not converges:
                 scattered.add(name)
         errors[name] = each
@@ -369,6 +371,23 @@ class _Trials:
     def count(self) -> int:
         """Number of benches."""
         return 1 + len(self._variations)
+
+    def confirmed(self, step: float, stated: float) -> _Trial:
+        """Return the errors with a step, or with half of it if these are larger than stated.
+
+        A figure whose values scatter may meet the error by chance, but seldom with both steps.
+
+        Raises
+        ------
+        RunError
+            When the bench itself fails with this step, or with a shorter one.
+        """
+        trial = self.at(step)
+        is_met = not trial.doubt and trial.errors.reached <= stated
+        if is_met and trial.errors.scattered and _HALF * step >= FINEST:
+            half = self.at(_HALF * step)
+            return trial if half.errors.reached <= stated else half
+        return trial
 
     def at(self, step: float) -> _Trial:
         """Return the errors with a step.

@@ -328,6 +328,8 @@ class StudyPlan:
             "chunk": CHUNK,
             "levels": 0 if self.is_sampled else self.levels,
         }
+        if bench.error is not None:
+            identity["error"] = float(bench.error)
         if bench.faults:
             identity["faults"] = bench.faults
         if self.sensitivity is not None:
