@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,7 +12,7 @@ import numpy as np
 
 from bywire.bench.bench import Bench
 from bywire.bench.changes import split_options
-from bywire.bench.computation import computation
+from bywire.bench.computation import computation, files_identity
 from bywire.bench.experiment import Case
 from bywire.bench.faults.fault_section import AT_ZERO, Injection
 from bywire.bench.faults.injected import taps_of, touched
@@ -361,8 +362,9 @@ class CampaignPlan:
                 "experiment": bench.experiment,
                 "parameters": bench.par.flat(),
                 "options": bench.chosen_options.flat(),
+                **files_identity(bench),
                 "stimulus": str(dict(bench.stimulus)),
-                "step": bench.step,
+                "step": None if math.isnan(bench.step) else bench.step,
                 "record": bench.record,
                 "noise": bench.seed,
                 **({} if bench.error is None else {"error": float(bench.error)}),
