@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bywire.api.run_sections import tested_brief, tested_data, tested_line, tested_section
+from bywire.api.run_sections import (
+    choice_data,
+    tested_brief,
+    tested_data,
+    tested_line,
+    tested_section,
+)
 from bywire.api.study_figures import load_drawing, study_figures
 from bywire.api.study_tables import (
     correlated,
@@ -67,6 +73,7 @@ from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.running import complete
 from bywire.studies.sensitivity import VarianceShares
 from bywire.studies.sought_cases import rare_failures, worst_cases
+from bywire.studies.stated_error import ErrorCheck, error_check, with_step
 from bywire.studies.statistics import Spread
 from bywire.studies.store import Origin, StudyStore, case_bench
 from bywire.studies.study_file import read_study
@@ -427,6 +434,8 @@ class StudyRun(Answer):
         missing.
     damaged
         Number of chunks that bywire recomputed because their files were unreadable.
+    check
+        Numerical errors of some cases, if the bench states an error.
     """
 
     plan: StudyPlan
@@ -435,6 +444,7 @@ class StudyRun(Answer):
     nominal: Result
     status: str
     damaged: int = 0
+    check: ErrorCheck | None = None
 
     @cached_property
     def _shown(self) -> ShownCases:
@@ -487,6 +497,7 @@ class StudyRun(Answer):
     def _warnings(self) -> list[str]:
         """The warnings, cached because computing them takes a pass over all cases."""
         texts = [*self.nominal.bench.outdated, *warned(self.findings, self.nominal.warnings)]
+        texts += filter(None, [self.check.warning if self.check else ""])
         if self.status == "unfinished":
             resume = StudyStore(self.folder).resume_command
             texts.append(unfinished(self.plan, len(self.cases), resume))
@@ -495,7 +506,8 @@ class StudyRun(Answer):
     @property
     def notes(self) -> list[str]:
         """Notes on rounding and repair, and on the meaning of intervals."""
-        return noted(self.findings, self.damaged)
+        checked = [self.check.note] if self.check and self.check.note else []
+        return [*noted(self.findings, self.damaged), *checked]
 
     def worst(self, kpi: str) -> Bench:
         """Return the bench of the worst case for a requirement.
@@ -626,9 +638,21 @@ class StudyRun(Answer):
             "folder": str(self.folder),
             "bench": tested_data(self.plan.bench, self.plan.tested),
             **findings_data(self.findings),
+            **choice_data(self.plan.bench),
+            **({} if self.check is None else {"error_check": _check_data(self.check)}),
             "warnings": self.warnings,
             "notes": self.notes,
         }
+
+
+def _check_data(check: ErrorCheck) -> dict[str, Any]:
+    return {
+        "cases": check.cases,
+        "kpis": {
+            name: {"largest": largest, "exceeding": check.exceeding.get(name, 0)}
+            for name, largest in check.largest.items()
+        },
+    }
 
 
 # --- Studies computed, or read from their folders
@@ -695,6 +719,7 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
         raise error.reworded(
             f"{error}. This study needs {' '.join(map(_loaded_by, unloaded))}"
         ) from None
+    plan = with_step(plan, store)
     is_listed = plan.design in SPANNED
     return (plan if is_listed else replace(plan, cases=int(record["cases"]))), origin
 
@@ -718,7 +743,8 @@ def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
         is_whole = len(findings.cases) == plan.total
     judged = status_of(findings.judgments) if findings.spreads else "failed"
     status = judged if is_whole else "unfinished"
-    return StudyRun(plan, store.folder, findings, nominal, status)
+    check = error_check(findings, nominal)
+    return StudyRun(plan, store.folder, findings, nominal, status, check=check)
 
 
 def _loaded_by(path: str) -> str:

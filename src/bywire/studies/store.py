@@ -13,7 +13,7 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 
 CASE, FAILURE, WARNINGS = "case", "failure", "warnings"
 """other columns than values and key figures: number, reason for a missing result, warnings"""
+
+CHOICE = "choice"
+"""entry of the record: the step that bywire chose for a stated error"""
 
 Columns = dict[str, NDArray[Any]]
 
@@ -354,6 +357,8 @@ class StudyStore(PieceFolder):
             "set": dict(origin.overrides),
             "systems": list(loaded_files()),
         }
+        if plan.bench.choice is not None:
+            about[CHOICE] = asdict(plan.bench.choice)
         self.begin(plan, about)
 
     def asked_and_computed(self, plan: StudyPlan) -> tuple[int, int]:

@@ -19,6 +19,7 @@ from bywire.signoff.plan import Computed, Task
 from bywire.studies.designs import MOST
 from bywire.studies.findings import Judgment
 from bywire.studies.plan import StudyPlan
+from bywire.studies.stated_error import with_step
 from bywire.studies.store import Origin as StudyOrigin
 from bywire.studies.store import StudyStore
 from bywire.studies.study_file import read_study
@@ -124,7 +125,8 @@ class StudyTask(Task):
 
     def compute(self, folder: Path, progress: Progress) -> Computed:
         """Compute the result, and write its report."""
-        plan, store = self.judged_plan, StudyStore(folder)
+        store = StudyStore(folder)
+        plan = with_step(self.judged_plan, store, progress)
         run = completed(StudyOrigin(self.file, self.changes), plan, store, None, "", progress)
         run.write(folder)
         return Computed(run, {str(j.demand): _judged(run, j) for j in run.findings.judgments})
