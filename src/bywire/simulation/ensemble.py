@@ -33,12 +33,13 @@ from bywire.simulation.advance import (
 from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
 from bywire.simulation.engine import CUDA, are_alike, prepare
 from bywire.simulation.native import Ends, Inputs
+from bywire.simulation.noise import Noise, put_noises
 from bywire.simulation.run import (
     Run,
     Trajectory,
     initial_vector,
     initial_vectors,
-    put_into,
+    put_signals,
     sampled_stimulus,
     selected,
     simulate,
@@ -264,7 +265,7 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, kernel: CaseKernel) -> Ar
     For lanes, the shape is (rows, nu, lanes), or (rows, nu) if all are equal.
     """
     t, ranges = schedule.stimulus_times, stimulus_ranges(group[0].model)
-    shape, width = (len(group[0].model.Stimulus._fields), t.size), kernel.lanes
+    shape, width, count = (len(group[0].model.Stimulus._fields), t.size), kernel.lanes, len(group)
 
     def require_usual(signals: Array, runs: Sequence[Run]) -> None:
         is_usual = np.isfinite(signals).all() and all(
@@ -275,21 +276,51 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, kernel: CaseKernel) -> Ar
             for run in runs:
                 sampled_stimulus(run, schedule)  # raises an error with the signal and the time
 
+    noises: dict[int, Noise] = {}
+
     def rows_of(case: int) -> Array:
         signals = np.zeros(shape)
-        put_into(signals.T, group[case], t)
+        noise = put_signals(signals.T, group[case], t)
+        if noise is not None:
+            noises[case] = noise
         require_usual(signals[None], group[case : case + 1])
         return signals
 
     if kernel.shares_stimuli:
-        return Inputs.of(rows_of, len(group), width)
+        inputs = Inputs.of(rows_of, count, width)
+        return inputs.with_noise(_noise_rows(noises, count, width, t.size)) if noises else inputs
     signals = np.zeros((width, *shape))  # each contiguous
     for lane, run in enumerate(group):
-        put_into(signals[lane].T, run, t)
-    signals[len(group) :] = signals[len(group) - 1]
+        noise = put_signals(signals[lane].T, run, t)
+        if noise is not None:
+            noises[lane] = noise
+    signals[count:] = signals[count - 1]
     require_usual(signals, group)
+    if noises:
+        rows = signals.transpose(2, 1, 0).copy()
+        _put_noises(rows.transpose(2, 0, 1)[:count], noises)
+        rows[:, :, count:] = rows[:, :, count - 1 : count]
+        return rows
     is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
     return (signals[0].T if is_shared else signals.transpose(2, 1, 0)).copy()
+
+
+def _put_noises(rows: Array, noises: Mapping[int, Noise]) -> None:
+    """Write the noise of all runs into their stimulus rows, shape (runs, rows, nu)."""
+    each = [noises[k] for k in range(len(rows))]
+    put_noises(rows, np.array([noise.seed for noise in each], np.uint64), each[0].columns)
+
+
+def _noise_rows(
+    noises: Mapping[int, Noise], count: int, width: int, samples: int
+) -> dict[int, Array]:
+    """Return the noise of all cases by column, shape (width, samples); idle ones repeat a case."""
+    columns = noises[0].columns
+    rows = np.empty((len(columns), width, samples))
+    each = {k: Noise(noise.seed, tuple(range(len(columns)))) for k, noise in noises.items()}
+    _put_noises(rows.transpose(1, 2, 0)[:count], each)
+    rows[:, count:] = rows[:, count - 1 : count]
+    return dict(zip(columns, rows, strict=True))
 
 
 class _Carried:

@@ -31,6 +31,7 @@ from bywire.simulation.advance import (
 from bywire.simulation.contacts import unresolved
 from bywire.simulation.engine import Engine, prepare
 from bywire.simulation.native import BufferedCall, Request
+from bywire.simulation.noise import Noise
 from bywire.simulation.schedule import Layout, Schedule, plan
 
 Status = Literal["done", "interrupted", "unsettled"]
@@ -326,16 +327,19 @@ def stimulus_ranges(model: Model) -> list[tuple[int, float, float]]:
     return [(fields.index(n), *ends) for n, ends in ranges_of(model.Stimulus).items()]
 
 
-def put_into(rows: Array, run: Run, t: Array) -> None:
+def put_signals(rows: Array, run: Run, t: Array) -> Noise | None:
     """Write a run's stimulus at times [s] to rows of zeros, shape (len(t), nu).
 
-    A stimulus with a method ``put_into(rows, t)`` may skip signals that are zero.
+    A stimulus with a method ``put_into(rows, t)`` may skip signals that are zero. Its attribute
+    ``noise`` describes the noise that this method leaves out, and that this function returns.
     """
     put = getattr(run.stimulus, "put_into", None)
     if put is None:
         rows[:] = run.stimulus(t)
-    else:
-        put(rows, t)
+        return None
+    put(rows, t)
+    noise: Noise = getattr(run.stimulus, "noise")  # noqa: B009 - not every stimulus has it
+    return noise if noise.columns else None
 
 
 def selected(names: Sequence[str], signals: Sequence[str]) -> NDArray[np.int32]:
