@@ -22,7 +22,8 @@ from bywire.core.typing import Array
 from bywire.core.version import __version__
 from bywire.simulation.advance import put_in_signals
 from bywire.simulation.ensemble import RunGroup
-from bywire.simulation.run import Run, Trajectory, doubts_of
+from bywire.simulation.run import Run, Trajectory
+from bywire.simulation.run_table import doubts_of, one_of, parameters_of
 
 
 def parameter_hash(par: ParameterSet) -> str:
@@ -100,7 +101,7 @@ def rows_of(
 def rows_of_group(group: RunGroup, settle: float) -> Rows:
     """Return the content of the recordings of several runs, for the computed rows."""
     signals = dict(zip(group.names, group.values, strict=True))
-    attributes = _attributes_of(group.runs[0].model.Output)
+    attributes = _attributes_of(one_of(group.runs).model.Output)
     return Rows(
         np.round(group.time - settle, 12), signals, {name: attributes[name] for name in signals}
     )
@@ -110,7 +111,7 @@ def ends_of_group(group: RunGroup) -> Rows:
     """Return the first and last rows of several runs, with all signals that are recorded there."""
     values = {name: each[:, [0, -1]] for name, each in zip(group.names, group.values, strict=True)}
     values |= zip(group.end_names, group.ends, strict=True)
-    attributes = _attributes_of(group.runs[0].model.Output)
+    attributes = _attributes_of(one_of(group.runs).model.Output)
     signals = {name: values[name] for name in attributes if name in values}
     return Rows(group.time[[0, -1]], signals, {name: attributes[name] for name in signals})
 
@@ -144,7 +145,7 @@ def watch_cases(
     iteration's limit; ``books``: `energy_doubts` of each run.
     """
     solver = map(solver_doubts, doubts_of(runs), unsettled)
-    model, pars = runs[0].model, [run.par for run in runs]
+    model, pars = one_of(runs).model, parameters_of(runs)
     rows.silent = model.silent(rows, pars)
     asked = set(model.may_warn(rows, pars))
     return [
