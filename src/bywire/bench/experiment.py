@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import lru_cache
 from string import Formatter
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
@@ -28,6 +27,9 @@ from bywire.core.units import convert, shown, unit_text
 from bywire.simulation.advance import Change
 from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _WORD = 32  # bits
 _POOL = 4  # minimum number of words of a seed before those of its child
@@ -148,7 +150,7 @@ def _value_text(value: Any, symbol: str, unit: str) -> str:
 
 # --- Experiments
 
-Recordings = Mapping[str, xr.Dataset]
+Recordings = Mapping[str, "xr.Dataset"]
 _LENGTHENED = 100.0  # maximum settling until all sample times coincide, relative to the run
 
 

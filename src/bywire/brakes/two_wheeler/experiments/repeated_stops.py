@@ -12,12 +12,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
-from scipy.integrate import solve_ivp
 
 from bywire.bench.experiment import Case, Experiment, Recordings, as_run
 from bywire.bench.kpis import vehicle_stop
@@ -36,6 +34,9 @@ from bywire.simulation.engine import prepare
 from bywire.simulation.run import simulate
 from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.two_wheeler import cold_start
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Heat = Mapping[str, disc_heat.State]
 """brake temperatures by part"""
@@ -87,6 +88,8 @@ def cooled(heat: Heat, par: TwoWheelerParameters, v: float, t: Array) -> dict[st
     t
         Times [s], increasing from 0.
     """
+    from scipy.integrate import solve_ivp  # slow to load
+
     rows: dict[str, Array] = {"time": t}
     for part, (brake, end) in BRAKES.items():
         law: disc_heat.Parameters = par.value(f"{brake}.heat")
@@ -250,6 +253,8 @@ def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]
 
 
 def _dataset(par: TwoWheelerParameters, pieces: list[dict[str, Array]]) -> xr.Dataset:
+    import xarray as xr  # slow to load
+
     known = signals_of(TwoWheelerByWire.Output) | {"stop": _STOP}
     names = ("time", "v", "stop", *TEMPERATURES)
     rows = {name: np.concatenate([each[name] for each in pieces]) for name in names}
