@@ -314,9 +314,9 @@ class Rows:
         par: ParameterSet | None = None,
     ) -> None:
         self._notes, self.par = notes, par
-        self._values = {**signals, TIME: time}
+        self._values = {**signals, TIME: time}  # the time keeps its place among the signals
         self._attributes = {**attributes, TIME: {"units": "s", "long_name": "time"}}
-        self._signals = tuple(signals)
+        self._signals = tuple(name for name in signals if name != TIME)
         self.silent: frozenset[str] = frozenset()  # parts of the model without warnings
         self.sizes = {TIME: time.size}
 
@@ -389,9 +389,8 @@ class Rows:
         if any(each is None for each in plain.values()):
             return self.dataset.assign(given)
         known = {name: each for name, each in plain.items() if each is not None}
-        every = {name: self._values[name] for name in self._signals}
         return self._like(
-            every | {name: values for name, (values, _) in known.items()},
+            self._values | {name: values for name, (values, _) in known.items()},
             {**self._attributes, **{name: attrs for name, (_, attrs) in known.items()}},
         )
 
