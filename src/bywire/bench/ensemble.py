@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Any, NamedTuple, cast, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
@@ -41,6 +40,9 @@ from bywire.simulation.ensemble import Ensemble, RunGroup, Variations, fit_lanes
 from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.run_table import change, parameters_of
 from bywire.simulation.run_table import one_of as one_run
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def varied_choices(bench: Bench) -> Mapping[str, tuple[Any, ...]]:
@@ -102,6 +104,8 @@ class BenchEnsemble:
         each = [result.recording for result in self.results]
         if signal not in each[0]:
             raise unknown_name("signal", signal, map(str, each[0].data_vars))
+        import xarray as xr  # slow to load
+
         joined = xr.concat([recording[signal] for recording in each], dim="case", join="outer")
         return joined.assign_coords({name: ("case", v) for name, v in self.variations.items()})
 
@@ -577,13 +581,13 @@ def _books(made: Round, group: RunGroup, rows: Rows, threads: int | None) -> lis
     For most runs, the two ends rule out such warnings. Otherwise, all rows are computed.
     """
     if group.end_names:
-        if are_surely_sound(cast(xr.Dataset, ends_of_group(group)), made.runs):
+        if are_surely_sound(cast("xr.Dataset", ends_of_group(group)), made.runs):
             return [[] for _ in made.places]
         one = one_run(made.runs)
         every, first = energy_signals(one), one.schedule().rows
         group = simulate_group(made.runs, every, threads, first=first - group.time.size)
         rows = rows_of_group(group, made.cases[0].settle)
-    return energy_doubts_of_cases(cast(xr.Dataset, rows), len(made.runs), made.runs)
+    return energy_doubts_of_cases(cast("xr.Dataset", rows), len(made.runs), made.runs)
 
 
 def _recorded(

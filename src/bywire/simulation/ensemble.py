@@ -374,8 +374,8 @@ class _Carried:
         self._changes: dict[int, list[tuple[int, ParameterSet]]] = {}
         if isinstance(group, RunTable):
             lanes = np.minimum(np.arange(width), self._count - 1)  # idle lanes repeat the last run
-            states, memories = group.states[lanes], group.memories[lanes]
-            self._vector = initial_vectors(kernel.layout, states, memories).T.copy()
+            vector = initial_vectors(kernel.layout, group.states[lanes], group.memories[lanes])
+            self._vector = vector.T.copy()
             self._parameters = group.parameters[lanes].T.copy()
             self._stimulus = _shared_stimuli(group, kernel, room)
             self._most = np.full(width, group.like.most_work)

@@ -25,10 +25,9 @@ from dataclasses import fields, replace
 from functools import cache, cached_property
 from pathlib import Path
 from types import FunctionType, ModuleType, NoneType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi, Measure, Undefined
@@ -47,6 +46,9 @@ from bywire.bench.kpis.translator import (
 from bywire.core.errors import CompilerError, ModelError
 from bywire.core.typing import Array
 from bywire.simulation.compiler import find_compiler, load_library
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 NO_NUMBER = "its value is not a finite number"
 _NO_FIGURE = Undefined(NO_NUMBER)
