@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from bywire.simulation import cuda
+from bywire.simulation import cuda_device
 from bywire.simulation.compiler import SINGLE, compile_library, find_compiler, load
 
 _BEFORE = """
@@ -181,10 +181,10 @@ class EmulatedDriver:
 def emulated(driver: EmulatedDriver) -> Iterator[EmulatedDriver]:
     """Have a driver's processors in place of this machine's; kernels stay text."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cuda, "bindings", lambda _: driver)
-        patch.setattr(cuda, "cuda_binary", lambda source, *_: source.encode())
-        cuda.find_device.cache_clear()
+        patch.setattr(cuda_device, "bindings", lambda _: driver)
+        patch.setattr(cuda_device, "cuda_binary", lambda source, *_: source.encode())
+        cuda_device.find_device.cache_clear()
         try:
             yield driver
         finally:
-            cuda.find_device.cache_clear()
+            cuda_device.find_device.cache_clear()

@@ -28,8 +28,7 @@ from bywire.core.child_process import python_command
 from bywire.core.errors import DeviceError, ParameterError
 from bywire.core.machine import worker_count
 from bywire.core.typing import Array
-from bywire.simulation import cuda
-from bywire.simulation.cuda import find_device
+from bywire.simulation.cuda_device import Memory, find_device
 from bywire.simulation.ensemble import Ensemble, simulate_ensemble
 from bywire.simulation.run import Run
 from bywire.studies.store import CASE, StudyStore
@@ -236,14 +235,14 @@ def _ensemble(run: Run, cases: int, at_cores: dict[int, float], clock: _Clock) -
 def _timed_kernels() -> Iterator[list[float]]:
     """Yield the run times of all kernels in the block [s], each with the wait for its end."""
     seconds: list[float] = []
-    plain = cuda.Memory.run
+    plain = Memory.run
 
-    def run(memory: cuda.Memory, *given: Any) -> None:
+    def run(memory: Memory, *given: Any) -> None:
         begin = time.perf_counter()
         plain(memory, *given)
         seconds.append(time.perf_counter() - begin)
 
-    with patch.object(cuda.Memory, "run", run):
+    with patch.object(Memory, "run", run):
         yield seconds
 
 

@@ -12,7 +12,8 @@ import pytest
 
 from bywire.core.errors import DeviceError
 from bywire.simulation.compiler import SINGLE, compile_library, find_compiler
-from bywire.simulation.cuda import emit_cuda, find_device
+from bywire.simulation.cuda import emit_cuda
+from bywire.simulation.cuda_device import find_device
 from bywire.simulation.engine import prepare
 from bywire.simulation.ensemble import Ensemble, simulate_ensemble
 from bywire.simulation.run import simulate

@@ -8,7 +8,8 @@ import pytest
 
 from bywire.bench.bench_file import read
 from bywire.core.errors import CompilerError, DeviceError
-from bywire.simulation.cuda import ENTRY, cuda_binary, emit_cuda
+from bywire.simulation.cuda import ENTRY, emit_cuda
+from bywire.simulation.cuda_device import cuda_binary
 from bywire.simulation.engine import prepare
 from bywire.simulation.stages import build_stages
 from raising import raises

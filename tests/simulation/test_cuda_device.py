@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from bywire.core.errors import DeviceError, ParameterError
-from bywire.simulation.cuda import find_device
+from bywire.simulation.cuda_device import find_device
 from emulated_driver import EmulatedDriver, Status, emulated
 from raising import raises
 

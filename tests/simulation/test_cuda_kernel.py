@@ -15,6 +15,7 @@ from bywire.bench.ensemble import simulate_ensemble as simulate_ensemble_of_benc
 from bywire.core.brake import load_system
 from bywire.core.errors import DeviceError, UnknownNameError
 from bywire.simulation import cuda
+from bywire.simulation.cuda_device import find_device
 from bywire.simulation.ensemble import Ensemble, simulate_ensemble, simulate_group
 from bywire.simulation.run import Run, simulate
 from emulated_driver import OK, EmulatedDriver, Status, emulated
@@ -85,7 +86,7 @@ def test_every_case_has_the_digits_that_it_has_in_lanes(experiment, driver, monk
 @pytest.mark.parametrize("experiment", BRAKES)
 def test_a_processor_that_is_there_agrees_with_this_machines(experiment):
     try:
-        device = cuda.find_device()
+        device = find_device()
     except DeviceError as error:
         pytest.skip(str(error))
     lanes, there = computed(experiment)

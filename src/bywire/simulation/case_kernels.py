@@ -21,7 +21,8 @@ from bywire.simulation.native import Ends, plan_array, pointer, run_in_calls
 from bywire.simulation.schedule import Layout, Schedule
 
 if TYPE_CHECKING:
-    from bywire.simulation.cuda import CudaDevice, CudaKernel
+    from bywire.simulation.cuda import CudaKernel
+    from bywire.simulation.cuda_device import CudaDevice
     from bywire.simulation.program import Program
 
 PAIRED = 32
@@ -204,7 +205,7 @@ def case_kernel(
         For ``cuda`` without a graphics processor, or without enough memory on it.
     """
     if engine == CUDA:
-        from bywire.simulation.cuda import find_device
+        from bywire.simulation.cuda_device import find_device
 
         return cuda_kernel(prepared, find_device(), selection, ends).for_cases(count, schedule)
     compiler = find_compiler()

@@ -11,7 +11,7 @@ from bywire.bench import running
 from bywire.bench.running import Result
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.typing import Progress
-from bywire.simulation.cuda import find_device
+from bywire.simulation.cuda_device import find_device
 from bywire.simulation.engine import CUDA
 from bywire.studies.designs import WORST
 from bywire.studies.executor import executor_of, require_workers
