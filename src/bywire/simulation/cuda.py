@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -193,7 +193,7 @@ class CudaKernel:
             plan = memory.room(_plan_size(schedule, self._inputs[1]))
             pieces = _pieces(schedule, begin, end)
             counts = [rows_between(schedule, *piece) for piece in pieces]
-            recording = _Recording(rows, counts, self._most, self.array)
+            recording = _Recording(rows, counts, self._most)
             room = memory.room(recording.size)
             apart = np.empty(0) if ends is None else np.ascontiguousarray(ends.values)
             edges = memory.room(apart.nbytes)
@@ -277,10 +277,9 @@ def _frames(schedule: Schedule) -> int:
 
 
 class _Recording:
-    """Destination of the rows of several time intervals, in the order of the caller's array.
+    """Rows of several time intervals on the device, in the order of the caller's array.
 
-    If the rows fill the caller's array and have room on the device, they are fetched at the end,
-    directly into the array. Otherwise, the rows of each interval go through a buffer.
+    They are fetched directly into the caller's array, all at the end if they fit on the device.
 
     Parameters
     ----------
@@ -289,27 +288,15 @@ class _Recording:
     counts
         Number of rows of each interval.
     most
-        Maximum number of rows on the device.
-    array
-        ``array(shape)`` allocates the buffer.
+        Maximum number of rows on the device, at least those of one interval.
     """
 
-    def __init__(
-        self,
-        rows: Array,
-        counts: Sequence[int],
-        most: int,
-        array: Callable[[tuple[int, ...]], Array],
-    ) -> None:
+    def __init__(self, rows: Array, counts: Sequence[int], most: int) -> None:
         self._rows, self._at, self.count = rows, 0, 0
         self._order = sorted(range(3), key=lambda axis: -rows.strides[axis])
-        straight = rows[:, : sum(counts)].transpose(self._order)
-        self._is_whole = straight.flags.c_contiguous and sum(counts) <= most
-        self._most = sum(counts) if self._is_whole else max(counts)
-        size = len(rows) * self._most * rows.shape[2]
-        self._buffer = array((0 if self._is_whole else size,))
-        self.size = FLOAT * size
-        self.begin([0])
+        self._most = max(min(most, sum(counts)), *counts)
+        self.size = FLOAT * len(rows) * self._most * rows.shape[2]
+        self.begin(counts)
 
     @property
     def offset(self) -> int:
@@ -321,25 +308,21 @@ class _Recording:
         return self.count + count <= self._planned
 
     def begin(self, counts: Sequence[int]) -> None:
-        """Prepare the destination of the rows of the next intervals, as many as there is room."""
+        """Plan to record the rows of the next intervals, as many as there is room for."""
         totals = np.cumsum(counts)
         self._planned = int(totals[totals <= self._most].max(initial=counts[0]))
         shape = len(self._rows), self._planned, self._rows.shape[2]
-        target = self._rows[:, self._at : self._at + self._planned].transpose(self._order)
-        buffer = self._buffer[: math.prod(shape)] if not self._is_whole else None
-        self._target = target
-        self._place = (
-            target if buffer is None else buffer.reshape([shape[axis] for axis in self._order])
-        )
-        strides = self._place.transpose(np.argsort(self._order)).strides
-        self.apart = [stride // FLOAT for stride in strides]
+        inner = {
+            axis: math.prod(shape[each] for each in self._order[place + 1 :])
+            for place, axis in enumerate(self._order)
+        }
+        self.apart = [inner[axis] for axis in range(3)]
 
     def fetch(self, memory: Memory, room: Any) -> None:
         """Copy the rows into the caller's array."""
         if self.count:
-            memory.get(room, self._place)
-            if not self._is_whole:
-                self._target[:] = self._place
+            target = self._rows[:, self._at : self._at + self._planned]
+            memory.get(room, target.transpose(self._order))
         self._at += self.count
         self.count = 0
 

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.callers import is_command_line
 from bywire.core.errors import CompilerError, DeviceError, ParameterError, quoted
 from bywire.core.libraries import how_to_install
 from bywire.core.pairs import read_count
@@ -85,8 +86,8 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
     """
     nvrtc = bindings("nvrtc")
     try:
-        _, *version = nvrtc.nvrtcVersion()
-        _, known = nvrtc.nvrtcGetSupportedArchs()
+        version: list[int] = _given(nvrtc.nvrtcVersion())
+        known: list[int] = _given(nvrtc.nvrtcGetSupportedArchs())[0]
     except RuntimeError:  # the bindings are installed, but the library is not
         raise DeviceError(
             f"bywire cannot load NVIDIA's compiler NVRTC. Install it ({how_to_install('gpu')}), "
@@ -123,11 +124,10 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
 
 
 def _compiled(nvrtc: Any, text: str, options: tuple[str, ...], is_own: bool) -> bytes:
-    error, program = nvrtc.nvrtcCreateProgram(text.encode(), b"kernel.cu", 0, [], [])
+    (program,) = _given(nvrtc.nvrtcCreateProgram(text.encode(), b"kernel.cu", 0, [], []))
     try:
-        if not int(error):
-            given = [each.encode() for each in options]
-            (error,) = nvrtc.nvrtcCompileProgram(program, len(given), given)
+        given = [each.encode() for each in options]
+        (error,) = nvrtc.nvrtcCompileProgram(program, len(given), given)
         if int(error):
             log = _text(nvrtc.nvrtcGetProgramLogSize, nvrtc.nvrtcGetProgramLog, program)
             lines = log.rstrip(b"\0").decode(errors="replace").splitlines()
@@ -143,10 +143,25 @@ def _compiled(nvrtc: Any, text: str, options: tuple[str, ...], is_own: bool) -> 
 
 def _text(size_of: Any, fill: Any, program: Any) -> bytes:
     """Return a text property of a program. The bindings write to an existing buffer."""
-    _, size = size_of(program)
+    (size,) = _given(size_of(program))
     content = bytes(bytearray(size))
-    fill(program, content)
+    _given(fill(program, content))
     return content
+
+
+def _given(answer: Any) -> Any:
+    """Return the results of a function of the compiler, without its status.
+
+    Raises
+    ------
+    CompilerError
+        When the status is an error.
+    """
+    status, *values = answer
+    if int(status):
+        text = f"NVRTC failed ({status.name}). Reinstall it ({how_to_install('gpu')}), {OTHERWISE}"
+        raise CompilerError(text, name="NVRTC", value=status.name)
+    return values
 
 
 # --- The device and its driver
@@ -154,9 +169,26 @@ def _text(size_of: Any, fill: Any, program: Any) -> bytes:
 VARIABLE = "BYWIRE_GPU"
 """environment variable that selects one of several graphics processors by number"""
 _NO_DRIVER = "the driver's library is missing"
-_OUT_OF_MEMORY = 2  # CUDA_ERROR_OUT_OF_MEMORY
 _BLOCKING = 4  # CU_CTX_SCHED_BLOCKING_SYNC
 _MEGA = 1e6
+_LEAST = 12000  # version of the driver's interface, 1000 major + 10 minor, as for NVRTC 12
+_EXCLUSIVE = 3  # CU_COMPUTEMODE_EXCLUSIVE_PROCESS
+_PITCH = 2**31 - 1  # maximum distance of two lines in a copy [byte]
+
+# Statuses of the driver, CUresult, by what the user can do about them.
+_OUT_OF_MEMORY = 2
+_IN_USE = 46  # DEVICE_UNAVAILABLE, by the device's compute mode
+_NOT_LOCKED = {_OUT_OF_MEMORY, 304, 800, 801}  # of this machine's memory, which needs no lock
+_ALREADY_ACTIVE = 708  # PRIMARY_CONTEXT_ACTIVE
+_TOO_OLD = {
+    200: "INVALID_IMAGE",
+    209: "NO_BINARY_FOR_GPU",
+    218: "INVALID_PTX",
+    222: "UNSUPPORTED_PTX_VERSION",
+}
+_MISMATCH = {803: "SYSTEM_DRIVER_MISMATCH", 804: "COMPAT_NOT_SUPPORTED_ON_DEVICE"}
+_DAMAGED = {214: "ECC_UNCORRECTABLE", 220: "NVLINK_UNCORRECTABLE", 226: "CONTAINED"}
+_TOO_LONG = 702  # LAUNCH_TIMEOUT
 FLOAT = 8
 """size of a number [byte]"""
 
@@ -174,23 +206,33 @@ class CudaDevice:
 
     def __init__(self, driver: Any, number: int) -> None:
         self._driver, self._lock = driver, threading.RLock()
+        self.label = f"graphics processor {number}"
         self._device = self._checked(driver.cuDeviceGet(number))
         name = self._checked(driver.cuDeviceGetName(128, self._device))
         self.label = name.split(b"\0")[0].decode(errors="replace")
-        kinds = driver.CUdevice_attribute
-        major, minor = (
-            self._checked(driver.cuDeviceGetAttribute(kind, self._device))
-            for kind in (
-                kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR,
-                kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR,
-            )
+        self._version = int(self._checked(driver.cuDriverGetVersion()))
+        if self._version < _LEAST:
+            raise self._too_old()
+        major, minor, mode = map(
+            self._attribute,
+            ("COMPUTE_CAPABILITY_MAJOR", "COMPUTE_CAPABILITY_MINOR", "COMPUTE_MODE"),
         )
-        self._capability = 10 * int(major) + int(minor)
+        self._capability = 10 * major + minor
+        self.is_exclusive = mode == _EXCLUSIVE and not self._attribute("MPS_ENABLED")
         # A thread that waits leaves its core to other work. The flag is a wish: another library of
         # this process may have chosen already.
-        driver.cuDevicePrimaryCtxSetFlags(self._device, _BLOCKING)
+        flagged = driver.cuDevicePrimaryCtxSetFlags(self._device, _BLOCKING)
+        if int(flagged[0]) != _ALREADY_ACTIVE:
+            self._checked(flagged)
         self._free: list[tuple[int, int]] = []
         self._context = self._checked(driver.cuDevicePrimaryCtxRetain(self._device))
+
+    def _attribute(self, name: str) -> int:
+        """Return an attribute of the device; zero if the bindings do not know it yet."""
+        kind = getattr(self._driver.CUdevice_attribute, f"CU_DEVICE_ATTRIBUTE_{name}", None)
+        if kind is None:
+            return 0
+        return int(self._checked(self._driver.cuDeviceGetAttribute(kind, self._device)))
 
     def load(self, source: str, entry: str) -> Any:
         """Return the function of a kernel.
@@ -224,13 +266,12 @@ class CudaDevice:
                 block = min(fitting, key=lambda each: each[1])
                 self._free.remove(block)
             else:
-                for address, _ in self._free:
-                    self._driver.cuMemFreeHost(address)
-                self._free.clear()
-                status, address = self._driver.cuMemHostAlloc(size, 0)
-                if int(status):
+                while self._free:
+                    self._checked(self._driver.cuMemFreeHost(self._free.pop()[0]))
+                locked = self._driver.cuMemHostAlloc(size, 0)
+                if int(locked[0]) in _NOT_LOCKED:
                     return np.empty(shape)
-                block = int(address), size
+                block = int(self._checked(locked)), size
         held = (ctypes.c_byte * block[1]).from_address(block[0])
         weakref.finalize(held, self._free.append, block).atexit = False
         memory = memoryview(held)  # keeps it
@@ -243,8 +284,11 @@ class CudaDevice:
             memory = Memory(self._driver, self._checked)
             try:
                 yield memory
-            finally:
-                memory.give_back()
+            except BaseException:
+                memory.give_back()  # a failed kernel has already invalidated everything
+                raise
+            for status in memory.give_back():
+                self._checked(status)
 
     @contextmanager
     def _current(self) -> Iterator[None]:
@@ -265,24 +309,71 @@ class CudaDevice:
         if not int(status):
             return values[0] if len(values) == 1 else values
         if int(status) == _OUT_OF_MEMORY:
-            unknown, *sizes = self._driver.cuMemGetInfo()  # this call may also fail
-            left = (
-                ""
-                if int(unknown)
-                else " ({:.4g} of {:.4g} MB are free)".format(*(size / _MEGA for size in sizes))
+            raise self._full(size)
+        if int(status) in _TOO_OLD:
+            raise self._too_old(f" ({status.name})")
+        raise self._failed(status)
+
+    def _full(self, size: int) -> DeviceError:
+        """Return the error for missing memory; ``size``: requested bytes, 0 if unknown."""
+        unknown, *sizes = self._driver.cuMemGetInfo()  # this call may also fail
+        left = (
+            ""
+            if int(unknown)
+            else " ({:.4g} of {:.4g} MB are free)".format(*(each / _MEGA for each in sizes))
+        )
+        need = f"{size / _MEGA:.3g} MB" if size else "memory"
+        return DeviceError(
+            f"{self.label} cannot allocate {need}{left}. End other programs on this graphics "
+            f"processor, select another one with {VARIABLE}, {OTHERWISE}",
+            name=self.label,
+            value=need,
+        )
+
+    def _too_old(self, status: str = "") -> DeviceError:
+        """Return the error for a driver that cannot load kernels."""
+        version = getattr(self, "_version", 0)
+        supported = f"{version // 1000}.{version % 1000 // 10}"
+        return DeviceError(
+            f"the driver of {self.label} supports CUDA {supported}, which is too old for the "
+            f"kernels{status}. Install a driver for CUDA {_LEAST // 1000} or later, at least as "
+            f"new as the installed NVRTC, {OTHERWISE}",
+            name="driver",
+            value=supported,
+            valid=f"CUDA {_LEAST // 1000} or later",
+        )
+
+    def _failed(self, status: Any) -> DeviceError:
+        """Return the error for a device that does not compute, or no longer."""
+        code, why = int(status), f"({status.name})"
+        if code == _IN_USE:
+            text = (
+                f"{self.label} is in use by another process, and its compute mode does not allow "
+                f"a further one {why}. End that process, which nvidia-smi lists, select another "
+                f"graphics processor with {VARIABLE}, or have an administrator type 'nvidia-smi "
+                f"-c DEFAULT', {OTHERWISE}"
             )
-            need = f"{size / _MEGA:.3g} MB" if size else "memory"
-            raise DeviceError(
-                f"{self.label} cannot allocate {need}{left}. End other programs on this graphics "
-                f"processor, select another one with {VARIABLE}, {OTHERWISE}",
-                name=self.label,
-                value=need,
+        elif code in _DAMAGED:
+            text = (
+                f"{self.label} has an uncorrectable memory error {why}. {_again()}, and have an "
+                f"administrator type 'nvidia-smi --gpu-reset' if the error returns, {OTHERWISE}"
             )
-        _, reason = self._driver.cuGetErrorString(status)
-        text = (reason or b"").decode(errors="replace") or status.name
-        where = getattr(self, "label", "a graphics processor")
-        message = f"{where} failed: {text} ({status.name}). Rerun the command, {OTHERWISE}"
-        raise DeviceError(message, name=where, value=status.name)
+        elif code == _TOO_LONG:
+            text = (
+                f"the system ended a kernel on {self.label}, which took too long for a graphics "
+                f"processor with a display {why}. Select another graphics processor with "
+                f"{VARIABLE}, {OTHERWISE}"
+            )
+        else:
+            given = self._driver.cuGetErrorString(status)  # this call may also fail
+            reason = (b"" if int(given[0]) else given[1] or b"").decode(errors="replace")
+            text = f"{self.label} failed: {reason or status.name} {why}. {_again()}, {OTHERWISE}"
+        return DeviceError(text, name=self.label, value=status.name)
+
+
+def _again() -> str:
+    """Return the advice after a failure, which a process's later calls repeat."""
+    return "Rerun the command" if is_command_line() else "Start Python again and rerun the call"
 
 
 class Memory:
@@ -316,9 +407,38 @@ class Memory:
             self._checked(self._driver.cuMemcpyHtoD(place, pointer(array).value, array.nbytes))
 
     def get(self, place: Any, array: NDArray[Any]) -> None:
-        """Copy memory at an address into a C-contiguous array."""
-        if array.nbytes:
-            self._checked(self._driver.cuMemcpyDtoH(pointer(array).value, place, array.nbytes))
+        """Copy consecutive numbers at an address into an array with any distances.
+
+        Lines of numbers at equal distances are a single copy.
+        """
+        if not array.nbytes:
+            return
+        *outer, (count, pitch), (width, apart) = _lines(array)
+        if apart != array.itemsize:
+            whole = np.empty(array.shape, array.dtype)
+            self.get(place, whole)
+            array[...] = whole
+            return
+        if pitch > _PITCH:
+            outer, count = [*outer, (count, pitch)], 1
+        begin, size = array.ctypes.data, width * array.itemsize
+        for number, where in enumerate(np.ndindex(*(length for length, _ in outer))):
+            line = begin + sum(k * stride for k, (_, stride) in zip(where, outer, strict=True))
+            self._get_lines(int(place) + number * count * size, line, size, count, pitch)
+
+    def _get_lines(self, place: int, line: int, size: int, count: int, pitch: int) -> None:
+        """Copy consecutive lines at an address to addresses at a distance [byte]."""
+        driver = self._driver
+        if count == 1:
+            self._checked(driver.cuMemcpyDtoH(line, place, size))
+            return
+        copied = driver.CUDA_MEMCPY2D()
+        copied.srcMemoryType = driver.CUmemorytype.CU_MEMORYTYPE_DEVICE
+        copied.dstMemoryType = driver.CUmemorytype.CU_MEMORYTYPE_HOST
+        copied.srcDevice, copied.srcPitch = place, size
+        copied.dstHost, copied.dstPitch = line, pitch
+        copied.WidthInBytes, copied.Height = size, count
+        self._checked(driver.cuMemcpy2D(copied))
 
     def run(self, function: Any, blocks: int, threads: int, arguments: Sequence[Any]) -> None:
         """Run a kernel and wait for its end; the arguments are addresses and floats."""
@@ -334,10 +454,25 @@ class Memory:
         )
         self._checked(self._driver.cuCtxSynchronize())
 
-    def give_back(self) -> None:
-        """Free all memory."""
-        for place in self._places:  # a failed kernel has already invalidated everything
-            self._driver.cuMemFree(place)
+    def give_back(self) -> list[Any]:
+        """Free all memory, and return the driver's answers."""
+        return [self._driver.cuMemFree(place) for place in self._places]
+
+
+def _lines(array: NDArray[Any]) -> list[tuple[int, int]]:
+    """Return length and distance [byte] of each axis, at least two, with as few as possible."""
+    axes = [(1, 0), (1, array.itemsize)]
+    for length, stride in zip(array.shape, array.strides, strict=True):
+        last_length, last_stride = axes[-1]
+        if length == 1:
+            continue
+        if last_length == 1:
+            axes[-1] = length, stride
+        elif last_stride == length * stride:
+            axes[-1] = last_length * length, stride
+        else:
+            axes.append((length, stride))
+    return axes
 
 
 @cache
@@ -358,6 +493,14 @@ def find_device() -> CudaDevice:
         if not int(status):
             status, count = driver.cuDeviceGetCount()
         reason = "" if not int(status) else status.name
+        if int(status) in _MISMATCH:
+            raise DeviceError(
+                f"the library of NVIDIA's driver does not fit the driver that the system has "
+                f"loaded ({reason}). Restart the machine to complete an update of the driver, "
+                f"{OTHERWISE}",
+                name="driver",
+                value=reason,
+            )
     except RuntimeError:
         reason, count = _NO_DRIVER, 0
     if reason or not count:
@@ -379,4 +522,12 @@ def find_device() -> CudaDevice:
             value=requested,
             valid="0" if count == 1 else f"0 to {count - 1}",
         )
-    return CudaDevice(driver, number)
+    try:
+        return CudaDevice(driver, number)
+    except RuntimeError as error:  # of the bindings, for a function that a driver does not have
+        raise DeviceError(
+            f"the driver is too old for NVIDIA's bindings ({error}). Install a driver for CUDA "
+            f"{_LEAST // 1000} or later, {OTHERWISE}",
+            name="driver",
+            valid=f"CUDA {_LEAST // 1000} or later",
+        ) from None
