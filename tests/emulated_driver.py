@@ -7,6 +7,7 @@ definitions stand before it, and behind it a loop over the threads.
 from __future__ import annotations
 
 import ctypes
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
@@ -16,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from bywire.simulation import cuda_device
+from bywire.simulation import cuda, cuda_device
 from bywire.simulation.compiler import SINGLE, compile_library, find_compiler, load
 from bywire.simulation.engine import Engine, Prepared
 
@@ -25,6 +26,7 @@ _BEFORE = """
 #include <string.h>
 #include <math.h>
 #define KERNEL
+#define LITERAL(type) (type)
 #define __launch_bounds__(threads)
 static _Thread_local struct { unsigned x; } threadIdx, blockIdx, blockDim;
 """
@@ -33,11 +35,10 @@ void emulated(unsigned blocks, unsigned threads, void **given) {
   blockDim.x = threads;
   for (blockIdx.x = 0; blockIdx.x < blocks; ++blockIdx.x)
     for (threadIdx.x = 0; threadIdx.x < threads; ++threadIdx.x)
-      bw_run_cases(*(double **)given[0], *(double *)given[1], *(double **)given[2],
-          *(double **)given[3], *(int64_t **)given[4], *(double **)given[5],
-          *(double **)given[6]);
+      {entry}({arguments});
 }
 """
+_HEAD = re.compile(r"^KERNEL void __launch_bounds__\(\d+\) (\w+)\(([^)]*)\)", re.M)
 
 
 class Status(IntEnum):
@@ -67,7 +68,14 @@ def compiled_here(source: str) -> Path:
     compiler = find_compiler()
     if compiler is None:
         pytest.skip("no C compiler")
-    return compile_library(_BEFORE + source + _BEHIND, SINGLE, compiler, "emulated")
+    head = _HEAD.search(source)
+    assert head
+    arguments = [
+        f"*({'void *' if '*' in each else 'double'} *)given[{k}]"
+        for k, each in enumerate(head[2].split(","))
+    ]
+    behind = _BEHIND.replace("{entry}", head[1]).replace("{arguments}", ", ".join(arguments))
+    return compile_library(_BEFORE + source + behind, SINGLE, compiler, "emulated")
 
 
 class EmulatedDriver:
@@ -92,7 +100,8 @@ class EmulatedDriver:
         self.started: Any = OK
         self.places: dict[int, Any] = {}
         self.locked: dict[int, Any] = {}  # this machine's memory
-        self.launches: list[int] = []  # threads of each
+        self.launches: list[int] = []  # threads of each that computes cases
+        self.entries: list[str] = []  # of all launches
         self.most = 0  # bytes that were taken at once
         self.copies = 0  # to this machine's memory
         self.version, self.mode = 12040, 0
@@ -196,15 +205,18 @@ class EmulatedDriver:
         return OK, load(compiled_here(binary.decode()), "emulated")
 
     def cuModuleGetFunction(self, module: Any, name: bytes) -> Any:
-        assert name == b"bw_run_cases"
-        return OK, module.emulated
+        assert name.startswith(b"bw_")
+        return OK, (name.decode(), module.emulated)
 
     def cuLaunchKernel(self, function: Any, *given: int) -> Any:
         blocks, _, _, threads, _, _, _, _, arguments, _ = given
-        self.launches.append(blocks * threads)
+        entry, run = function
+        self.entries.append(entry)
+        if entry == cuda.ENTRY:
+            self.launches.append(blocks * threads)
         if self.is_lost():
             return (Status.CUDA_ERROR_ECC_UNCORRECTABLE,)
-        function(blocks, threads, ctypes.c_void_p(arguments))
+        run(blocks, threads, ctypes.c_void_p(arguments))
         return (OK,)
 
     def cuGetErrorString(self, status: Status) -> Any:

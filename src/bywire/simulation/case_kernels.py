@@ -21,7 +21,7 @@ from bywire.simulation.native import Ends, plan_array, pointer, run_in_calls
 from bywire.simulation.schedule import Layout, Schedule
 
 if TYPE_CHECKING:
-    from bywire.simulation.cuda import CudaKernel
+    from bywire.simulation.cuda import CudaKernel, HeldRows
     from bywire.simulation.cuda_device import CudaDevice
     from bywire.simulation.program import Program
 
@@ -56,13 +56,17 @@ class CaseKernel(Protocol):
         """Return an array that the kernel fills fast; its values are not determined."""
         ...
 
+    def hold(self, shape: tuple[int, int, int]) -> HeldRows | None:
+        """Return rows of shape (signals, cases, rows) that stay on a device; None for an array."""
+        ...
+
     def advance(
         self,
         schedule: Schedule,
         parameters: Array,
         stimulus: Any,
         vector: Array,
-        rows: Array,
+        rows: Any,
         end: int,
         begin: int = 0,
         ends: Ends | None = None,
@@ -123,6 +127,10 @@ class LaneKernel:
     def array(self, shape: tuple[int, ...]) -> Array:
         """Return an uninitialized array; see `CaseKernel`."""
         return np.empty(shape)
+
+    def hold(self, shape: tuple[int, int, int]) -> None:
+        """Return nothing, because a processor's rows are arrays; see `CaseKernel`."""
+        return
 
     def advance(
         self,

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import math
+import weakref
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -157,20 +159,27 @@ class CudaKernel:
         """Return an uninitialized array that the device fills fast; see `CaseKernel`."""
         return self._device.host_array(shape)
 
+    def hold(self, shape: tuple[int, int, int]) -> HeldRows | None:
+        """Return rows that stay on the device if they fit there together; see `CaseKernel`."""
+        _, cases, rows = shape
+        fits = cases == self.lanes and rows <= self._most
+        return HeldRows(self._device, shape) if fits else None
+
     def advance(
         self,
         schedule: Schedule,
         parameters: Array,
         stimulus: Array | Inputs,
         vector: Array,
-        rows: Array,
+        rows: Array | Window,
         end: int,
         begin: int = 0,
         ends: Ends | None = None,
     ) -> None:
         """Run the frames from begin to end for one batch; see ``case_kernels.LaneKernel.advance``.
 
-        ``stimulus``: rows for all cases, shape (rows, nu), or `Inputs`.
+        ``stimulus``: rows for all cases, shape (rows, nu), or `Inputs`. ``rows``: an array, or a
+        window of rows that stay on the device.
 
         Raises
         ------
@@ -193,8 +202,12 @@ class CudaKernel:
             plan = memory.room(_plan_size(schedule, self._inputs[1]))
             pieces = _pieces(schedule, begin, end)
             counts = [rows_between(schedule, *piece) for piece in pieces]
-            recording = _Recording(rows, counts, self._most)
-            room = memory.room(recording.size)
+            recording: _Recording | _Staying
+            if isinstance(rows, Window):
+                recording, room = _Staying(rows), rows.place
+            else:
+                recording = _Recording(rows, counts, self._most)
+                room = memory.room(recording.size)
             apart = np.empty(0) if ends is None else np.ascontiguousarray(ends.values)
             edges = memory.room(apart.nbytes)
             memory.put(edges, apart)
@@ -207,7 +220,7 @@ class CudaKernel:
                 ahead = first // schedule.stimulus_frames
                 where = given.rows(ahead, last // schedule.stimulus_frames + 1)
                 numbers = [*plan_array(schedule, first, last, self._signals)]
-                numbers += [self.lanes, len(rows), ahead, *recording.apart, *frames, *where]
+                numbers += [self.lanes, recording.cases, ahead, *recording.apart, *frames, *where]
                 memory.put(plan, np.array(numbers, dtype=np.int64))
                 memory.run(
                     self._function,
@@ -292,7 +305,7 @@ class _Recording:
     """
 
     def __init__(self, rows: Array, counts: Sequence[int], most: int) -> None:
-        self._rows, self._at, self.count = rows, 0, 0
+        self._rows, self._at, self.count, self.cases = rows, 0, 0, len(rows)
         self._order = sorted(range(3), key=lambda axis: -rows.strides[axis])
         self._most = max(min(most, sum(counts)), *counts)
         self.size = FLOAT * len(rows) * self._most * rows.shape[2]
@@ -325,6 +338,137 @@ class _Recording:
             memory.get(room, target.transpose(self._order))
         self._at += self.count
         self.count = 0
+
+
+class _Staying:
+    """Rows of time intervals that stay where they are recorded; see `_Recording`."""
+
+    def __init__(self, rows: Window) -> None:
+        self.count, self.cases, self.apart = 0, rows.cases, rows.apart
+
+    @property
+    def offset(self) -> int:
+        return FLOAT * self.count
+
+    def fits(self, count: int) -> bool:
+        return True
+
+    def begin(self, counts: Sequence[int]) -> None:
+        pass
+
+    def fetch(self, memory: Memory, room: Any) -> None:
+        pass
+
+
+@dataclass(frozen=True)
+class Window:
+    """Part of `HeldRows` that a kernel fills.
+
+    Parameters
+    ----------
+    place
+        Address of its first row.
+    cases
+        Number of cases.
+    apart
+        Distances between cases, rows and signals, in numbers.
+    """
+
+    place: int
+    cases: int
+    apart: tuple[int, int, int]
+
+
+EXTREMES_ENTRY = "bw_extremes"
+EXTREMES = f"""
+KERNEL void __launch_bounds__({THREADS}) {EXTREMES_ENTRY}(const int64_t *restrict sizes,
+    const double *restrict rows, double *restrict extremes) {{
+  const int64_t at = (int64_t)blockIdx.x * blockDim.x + threadIdx.x, n = sizes[1];
+  if (at >= sizes[0]) return;
+  const double *y = rows + at * n;
+  double low = y[0], high = y[0];
+  int is_finite = 1;
+  for (int64_t k = 0; k < n; ++k) {{
+    uint64_t bits;
+    memcpy(&bits, y + k, sizeof(bits));
+    is_finite &= (~bits & 0x7ff0000000000000u) != 0;
+    low = y[k] < low ? y[k] : low;
+    high = y[k] > high ? y[k] : high;
+  }}
+  const uint64_t bits = 0x7ff8000000000000u;
+  if (!is_finite) memcpy(&low, &bits, sizeof(bits)), memcpy(&high, &bits, sizeof(bits));
+  double *to = extremes + 4 * at;
+  to[0] = y[0], to[1] = low, to[2] = high, to[3] = y[n - 1];
+}}
+"""
+"""kernel for the extremes of rows, one thread for each signal of a case"""
+
+
+class HeldRows:
+    """Recorded rows that stay on the device, like an array of shape (signals, cases, rows).
+
+    They are fetched on first use, signal by signal or all together, until they are closed.
+
+    Parameters
+    ----------
+    device
+        The graphics processor.
+    shape
+        Number of signals, cases and rows.
+    """
+
+    def __init__(self, device: CudaDevice, shape: tuple[int, int, int]) -> None:
+        self.device, self.shape = device, shape
+        self.place = device.keep(FLOAT * math.prod(shape))
+        self.close = weakref.finalize(self, device.drop, self.place)
+        self.close.atexit = False
+        self._fetched: dict[int, Array] = {}
+
+    def window(self, first: int) -> Window:
+        """Return the part from a row on, for all signals and cases."""
+        _, cases, rows = self.shape
+        return Window(self.place + FLOAT * first, cases, (rows, 1, cases * rows))
+
+    def signal(self, k: int) -> Array:
+        """Return a signal, shape (cases, rows)."""
+        if k not in self._fetched:
+            self._fetched[k] = self._copied(self.address(k), self.shape[1:])
+        return self._fetched[k]
+
+    @cached_property
+    def extremes(self) -> Array:
+        """First, lowest, highest and last row of each signal, shape (signals, cases, 4).
+
+        The lowest and the highest are NaN if a row is not finite.
+        """
+        signals, cases, rows = self.shape
+        function = self.device.load(EXTREMES, EXTREMES_ENTRY)
+        array = self.device.host_array((signals, cases, 4))
+        with self.device.working() as memory:
+            sizes, room = memory.room(2 * FLOAT), memory.room(array.nbytes)
+            memory.put(sizes, np.array([signals * cases, rows]))
+            arguments = sizes, self.place, room
+            memory.run(function, -(-signals * cases // THREADS), THREADS, arguments)
+            memory.get(room, array)
+        return array
+
+    def address(self, k: int) -> int:
+        """Return the address of a signal, whose cases are contiguous, one after the other."""
+        return self.place + FLOAT * k * self.shape[1] * self.shape[2]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.array(self._copied(self.place, self.shape), dtype=dtype, copy=copy)
+
+    def __getitem__(self, key: Any) -> Any:
+        return np.asarray(self)[key]
+
+    def _copied(self, place: int, shape: tuple[int, ...]) -> Array:
+        if not self.close.alive:
+            raise ValueError("these rows have been freed")
+        array = self.device.host_array(shape)
+        with self.device.working() as memory:
+            memory.get(place, array)
+        return array
 
 
 def rows_between(schedule: Schedule, begin: int, end: int) -> int:

@@ -34,8 +34,9 @@ from bywire.simulation.compiler import digest_of, is_intact, sha256, usable_fold
 from bywire.simulation.native import pointer
 
 # Fused products and sums would round differently from the processor's kernels. The second option is
-# necessary because the source does not declare each function as a device function.
-OPTIONS = ("--fmad=false", "--device-as-default-execution-space")
+# necessary because the source does not declare each function as a device function. C++20 has
+# designated initializers, as C.
+OPTIONS = ("--fmad=false", "--device-as-default-execution-space", "--std=c++20")
 OTHERWISE = "or use engine = 'auto', which computes on this machine's processor"
 
 
@@ -225,6 +226,7 @@ class CudaDevice:
         if int(flagged[0]) != _ALREADY_ACTIVE:
             self._checked(flagged)
         self._free: list[tuple[int, int]] = []
+        self._loaded: dict[str, Any] = {}
         self._context = self._checked(driver.cuDevicePrimaryCtxRetain(self._device))
 
     def _attribute(self, name: str) -> int:
@@ -235,17 +237,20 @@ class CudaDevice:
         return int(self._checked(self._driver.cuDeviceGetAttribute(kind, self._device)))
 
     def load(self, source: str, entry: str) -> Any:
-        """Return the function of a kernel.
+        """Return the function of a kernel, loaded once.
 
         Raises
         ------
         CompilerError
             With the compiler's message.
         """
-        binary = cuda_binary(source, self._capability, entry)
         with self._current():
-            module = self._checked(self._driver.cuModuleLoadData(binary))
-            return self._checked(self._driver.cuModuleGetFunction(module, entry.encode()))
+            if source not in self._loaded:
+                binary = cuda_binary(source, self._capability, entry)
+                module = self._checked(self._driver.cuModuleLoadData(binary))
+                function = self._driver.cuModuleGetFunction(module, entry.encode())
+                self._loaded[source] = self._checked(function)
+            return self._loaded[source]
 
     def free(self) -> int:
         """Return the number of free bytes."""
@@ -276,6 +281,22 @@ class CudaDevice:
         weakref.finalize(held, self._free.append, block).atexit = False
         memory = memoryview(held)  # keeps it
         return np.frombuffer(memory, dtype=float, count=math.prod(shape)).reshape(shape)
+
+    def keep(self, size: int) -> int:
+        """Return the address of a number of bytes that stay until they are dropped.
+
+        Raises
+        ------
+        DeviceError
+            When there is not enough free memory.
+        """
+        with self._current():
+            return int(Memory(self._driver, self._checked).room(size))
+
+    def drop(self, place: int) -> None:
+        """Free memory that was kept; a failed kernel has already invalidated it."""
+        with self._current():
+            self._driver.cuMemFree(place)
 
     @contextmanager
     def working(self) -> Iterator[Memory]:

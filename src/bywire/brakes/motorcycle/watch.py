@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.core.parameters import ParameterSet
+from bywire.core.validity import outline
 
 WATCHED = ("at_stop", "F_stop", "i", "p_pd")
 
@@ -28,7 +29,7 @@ def cases_at_stops(rows: Any) -> list[int]:
     """Return the cases with a warning about a stop; ``rows``: signals of shape (cases, rows)."""
     if "F_stop" not in rows:
         return []
-    force = rows["F_stop"].values
+    force = outline(rows, "F_stop")
     return np.flatnonzero((force > 0).any(axis=-1) | (force[..., -1] < 0)).tolist()
 
 
