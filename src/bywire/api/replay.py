@@ -32,7 +32,7 @@ from bywire.identification.replay_fit import (
     whole_record,
 )
 from bywire.identification.tracking import Track
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, Outcome, outcome_of
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -79,6 +79,11 @@ class Replay(Answer):
     def holds(self) -> bool:
         """Whether every tolerance is met."""
         return all(v.met for fit in self.fits for v in fit.verdicts)
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the tolerances; ``not shown`` without any."""
+        return outcome_of([v.outcome for fit in self.fits for v in fit.verdicts])
 
     @property
     def notes(self) -> list[str]:

@@ -28,7 +28,7 @@ from bywire.core.arguments import require_kinds
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Progress
 from bywire.report.animation.scene import SCENES
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, FigureAt, Outcome, outcome_of
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -132,6 +132,16 @@ class BenchResult(Result, Answer):
     def holds(self) -> bool:
         """Whether every requirement is met, and none is undecided."""
         return self.status not in ("failed", "undecided")
+
+    @property
+    def key_figures(self) -> list[FigureAt]:
+        """The key figures of the bench."""
+        return [FigureAt(kpi) for kpi in self.kpis]
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the bench's requirements; ``not shown`` without any."""
+        return outcome_of([verdict.outcome for verdict in self.verdicts])
 
     @property
     def warnings(self) -> list[str]:

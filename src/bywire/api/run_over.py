@@ -22,7 +22,7 @@ from bywire.bench.running import Result
 from bywire.bench.step_error import are_distinct
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array, Progress
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, FigureAt, Outcome, outcome_of
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -69,6 +69,20 @@ class BenchRange(Answer):
     def holds(self) -> bool:
         """Whether every requirement is met at every value."""
         return all(v.met for result in self.results for v in result.verdicts)
+
+    @property
+    def key_figures(self) -> list[FigureAt]:
+        """The key figures at every value of the range."""
+        return [
+            FigureAt(kpi, f"{self.name} = {amount(value, self.unit)}")
+            for value, result in zip(self.values, self.results, strict=True)
+            for kpi in result.kpis
+        ]
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the bench's requirements at every value; ``not shown`` without any."""
+        return outcome_of([v.outcome for result in self.results for v in result.verdicts])
 
     @property
     def warnings(self) -> list[str]:
@@ -293,20 +307,13 @@ class BenchRange(Answer):
         }
 
 
-def run_over(
-    bench: Bench, over: str, progress: Progress | None, engine: str, estimate_error: bool
-) -> BenchRange:
-    """Return a bench's results for every value of ``NAME=LOW:HIGH:COUNT`` (see `bywire.run`).
+def range_of_bench(bench: Bench, over: str) -> tuple[str, str, list[float]]:
+    """Return name, SI unit and values of a range ``NAME=LOW:HIGH:COUNT`` for a bench.
 
     Raises
     ------
     InputError
-        If the range is invalid, the name is not a number of the bench or its options, or the bench
-        rejects a value.
-    RunError
-        If a run fails.
-    KeyboardInterrupt
-        If interrupted.
+        If the range is invalid, or the name is not a number of the bench or its options.
     """
     name, equals, text = (part.strip() for part in over.partition("="))
     if not equals:
@@ -324,9 +331,28 @@ def run_over(
         raise ParameterError(
             f"over {over!r} needs at least two different values", name="over", value=repr(over)
         )
+    return name, leaf.unit.symbol, values
+
+
+def run_over(
+    bench: Bench, over: str, progress: Progress | None, engine: str, estimate_error: bool
+) -> BenchRange:
+    """Return a bench's results for every value of ``NAME=LOW:HIGH:COUNT`` (see `bywire.run`).
+
+    Raises
+    ------
+    InputError
+        If the range is invalid, the name is not a number of the bench or its options, or the bench
+        rejects a value.
+    RunError
+        If a run fails.
+    KeyboardInterrupt
+        If interrupted.
+    """
+    name, unit, values = range_of_bench(bench, over)
     benches = [changed(bench, {name: value}) for value in values]
     results = run_benches(benches, progress, engine, estimate_error=estimate_error)
-    return BenchRange(bench, name, leaf.unit.symbol, tuple(values), results)
+    return BenchRange(bench, name, unit, tuple(values), results)
 
 
 def _cell(name: str, result: Result) -> Cell:

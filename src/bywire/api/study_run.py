@@ -47,7 +47,7 @@ from bywire.core.errors import FileError, InputError, ParameterError, unknown_na
 from bywire.core.parameters import field_notes
 from bywire.core.typing import Progress, silent
 from bywire.core.units import shown
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, Outcome
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -471,6 +471,12 @@ class StudyRun(Answer):
     def holds(self) -> bool:
         """Whether all cases are computed and every requirement is met."""
         return self.status in ("done", "passed")
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the requirements; ``undecided`` if cases are missing."""
+        words: dict[str, Outcome] = {"passed": "met", "failed": "missed", "done": "not shown"}
+        return words.get(self.status, "undecided")
 
     @property
     def warnings(self) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from bywire.bench.bench import Bench
 from bywire.bench.changes import split_options
-from bywire.bench.computation import computation
+from bywire.bench.computation import computation, files_identity
 from bywire.bench.experiment import Case
 from bywire.bench.faults.fault_section import AT_ZERO, Injection
 from bywire.bench.faults.injected import taps_of, touched
@@ -341,6 +341,7 @@ class CampaignPlan:
                 "experiment": bench.experiment,
                 "parameters": bench.par.flat(),
                 "options": bench.chosen_options.flat(),
+                **files_identity(bench),
                 "stimulus": str(dict(bench.stimulus)),
                 "step": bench.step,
                 "record": bench.record,

@@ -20,6 +20,8 @@ LARGEST = 1_000_000
 _KEY_PARTS = 16
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_KEY_PARTS}}}")
+_ENTRY = re.compile(r"[ \t]*\[\[[ \t]*([\w-]+)[ \t]*\]\]")
+_TRIPLE = re.compile(r'"""|\'\'\'')
 _ADVICE = "check the path"
 
 
@@ -67,6 +69,35 @@ def read_toml(
     return content
 
 
+def entry_lines(file: Path) -> dict[str, list[int]]:
+    """Return the lines at which the entries of arrays of tables start, by the array's name.
+
+    Only for errors: the lines are those of ``[[NAME]]`` outside multi-line strings.
+    """
+    lines: dict[str, list[int]] = {}
+    closing = ""
+    for number, line in enumerate(_text(file, "file", _no_idea, "").splitlines(), start=1):
+        if not closing and (match := _ENTRY.match(line)):
+            lines.setdefault(match[1], []).append(number)
+        closing = _closing_after(line, closing)
+    return lines
+
+
+def _closing_after(line: str, closing: str) -> str:
+    """Return the quotation marks that end the multi-line string at the end of a line; or empty."""
+    rest = line
+    while True:
+        if closing:
+            _, found, rest = rest.partition(closing)
+            if not found:
+                return closing
+            closing = ""
+        match = _TRIPLE.search(rest)
+        if match is None or "#" in rest[: match.start()]:
+            return ""
+        closing, rest = match[0], rest[match.end() :]
+
+
 def _require_numbers(value: Any, file: Path, key: str) -> None:
     """Reject integers beyond the range of floating point, at any depth."""
     if isinstance(value, dict):
@@ -111,15 +142,28 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
 
 # --- Kinds of files
 
-BENCH, STUDY, LIFE, CAMPAIGN = "bench", "study", "life", "campaign"
+BENCH, STUDY, LIFE, CAMPAIGN, SIGNOFF = "bench", "study", "life", "campaign", "sign-off"
 _COMMANDS = {
     BENCH: "bywire run",
     STUDY: "bywire study run",
     LIFE: "bywire life",
     CAMPAIGN: "bywire faults",
+    SIGNOFF: "bywire signoff",
 }
-_WORDS = {BENCH: "a bench", STUDY: "a study", LIFE: "a life", CAMPAIGN: "a fault campaign"}
-HEADS = {BENCH: "experiment", STUDY: "bench", LIFE: "life", CAMPAIGN: "bench"}
+_WORDS = {
+    BENCH: "a bench",
+    STUDY: "a study",
+    LIFE: "a life",
+    CAMPAIGN: "a fault campaign",
+    SIGNOFF: "a sign-off",
+}
+HEADS = {
+    BENCH: "experiment",
+    STUDY: "bench",
+    LIFE: "life",
+    CAMPAIGN: "bench",
+    SIGNOFF: "requirement",
+}
 """required key of each kind"""
 _OF_CAMPAIGNS = ("campaign", "criteria")
 _NEVER_IN_STUDIES = {*_OF_CAMPAIGNS, "values", "residuals", "rates", "reaction"}
@@ -135,6 +179,8 @@ def kind_of(content: Mapping[str, Any]) -> str:
     ('bench', 'study')
     """
     keys = content.keys()
+    if keys & {"requirement", "evidence"}:
+        return SIGNOFF
     if "life" in keys:
         return LIFE
     if "bench" not in keys:
@@ -161,7 +207,7 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     content
         Content of the file.
     wanted
-        `BENCH`, `STUDY`, `LIFE` or `CAMPAIGN`.
+        `BENCH`, `STUDY`, `LIFE`, `CAMPAIGN` or `SIGNOFF`.
     file
         Path of the file.
 
