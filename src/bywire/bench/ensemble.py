@@ -396,6 +396,7 @@ def rounds(
     threads: int | None = None,
     signals: Callable[[Run], Wanted | None] = lambda _: None,
     limits: Sequence[Mapping[str, float]] = (),
+    hold: bool = False,
 ) -> Iterator[Round]:
     """Yield the first run of all benches, then the second run, and so on.
 
@@ -412,6 +413,8 @@ def rounds(
         ``signals(run)``: outputs to record of runs side by side; None for all.
     limits
         Maximum work of each bench's runs, by label (default: unlimited).
+    hold
+        Whether a graphics processor may hold the rows of a round until the next one.
 
     Raises
     ------
@@ -442,8 +445,11 @@ def rounds(
         if is_alike and len(runs) > 1 and fit_lanes(runs, kinds[0]):
             times = one.schedule().record_times - cases[0].settle
             first = int(np.searchsorted(times, -cases[0].keep - 1e-9))
-            group = simulate_group(runs, outputs, threads, report, first, kinds[0], ends)
-            yield Round(places, cases, runs, group)
+            group = simulate_group(runs, outputs, threads, report, first, kinds[0], ends, hold)
+            try:
+                yield Round(places, cases, runs, group)
+            finally:
+                group.close()
         else:
             yield Round(places, cases, runs, _one_by_one(runs, report, kinds))
 
@@ -539,7 +545,7 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
     wanted = set() if families is None else families.signals(options)
     signals = partial(needed, wanted) if families is not None else lambda _: None
     figures: tuple[KpiOfCases, ...] | None = None
-    for made in rounds(benches, threads=threads, signals=signals):
+    for made in rounds(benches, threads=threads, signals=signals, hold=families is not None):
         group = made.trajectories
         if not isinstance(group, RunGroup):
             _recorded(benches, made, recordings, warnings)
