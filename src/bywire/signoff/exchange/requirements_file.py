@@ -63,7 +63,7 @@ class Entry:
     Parameters
     ----------
     values
-        Texts by the names of their attributes, without those of earlier results.
+        Texts by the names of their attributes in lower case, without earlier results.
     line
         Its line.
     group
@@ -71,7 +71,7 @@ class Entry:
     is_heading
         Whether it is a heading unless it also has the text of a requirement.
     attachments
-        Attributes whose text contains a binary attachment, with its line and description.
+        Line and description of a binary attachment, by the name of the attribute in lower case.
     """
 
     values: Mapping[str, str]
