@@ -121,6 +121,11 @@ class ReqifFile(RequirementsFile):
         self._objects = self._ordered()
 
     @property
+    def head_line(self) -> int:
+        """Line of the types of objects."""
+        return (self._core.first("SPEC-TYPES") or self._core).line
+
+    @property
     def attributes(self) -> Sequence[str]:
         """Names of all attributes of objects."""
         names = [each.name for each in self._by_identifier.values()]
@@ -301,7 +306,9 @@ class ReqifFile(RequirementsFile):
             if pieces:
                 is_new = True
                 yield self._added(kind, "SPEC-ATTRIBUTES", pieces)
-        known_types = {self._identifier(each) for each in self._core.every("DATATYPES", "*")}
+        known_types = {
+            each.attributes.get("IDENTIFIER") for each in self._core.every("DATATYPES", "*")
+        }
         if is_new and _DATATYPE not in known_types:
             mark = self._core.tag.removesuffix(self._core.name)
             yield self._added(

@@ -110,9 +110,9 @@ class RequirementsFile(ABC):
         """Names of all attributes."""
 
     @property
+    @abstractmethod
     def head_line(self) -> int:
-        """Line with the names of the attributes; 0 if they have no line."""
-        return 0
+        """Line from which the names of the attributes come."""
 
     @abstractmethod
     def with_results(self, results: Mapping[int, Result]) -> bytes:
