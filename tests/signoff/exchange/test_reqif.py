@@ -35,6 +35,17 @@ def read(file: Path, content: bytes | str = REQIF, **names: str) -> Imported:
     return imported_from(file, AttributeNames(**names), {})
 
 
+def test_headings_of_several_specifications_and_types(tmp_path: Path) -> None:
+    second = '<SPECIFICATION IDENTIFIER="_b" LONG-NAME="Pedal"/></SPECIFICATIONS>'
+    kind = '<SPEC-OBJECT-TYPE IDENTIFIER="_heading" LONG-NAME="Heading"/></SPEC-TYPES>'
+    text = REQIF.replace("</SPECIFICATIONS>", second).replace("</SPEC-TYPES>", kind)
+    force, background = read(tmp_path / "a.reqif", text).statements
+    assert (force.group, background.group) == ("Brake / 1 Force", "Brake")
+    start = text.index('IDENTIFIER="_o3"')
+    text = text[:start] + text[start:].replace(">_type<", ">_heading<", 1)
+    assert [each.id for each in read(tmp_path / "a.reqif", text).statements] == ["R-Ü 1"]
+
+
 def elements_of(content: bytes) -> list[str]:
     """Return every element of a file in its order, with attributes and text."""
     return [
