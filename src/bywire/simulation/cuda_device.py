@@ -370,7 +370,7 @@ class CudaDevice:
         if code == _IN_USE:
             text = (
                 f"{self.label} is in use by another process, and its compute mode does not allow "
-                f"a further one {why}. End that process, which nvidia-smi lists, select another "
+                f"another one {why}. End that process, which nvidia-smi lists, select another "
                 f"graphics processor with {VARIABLE}, or have an administrator type 'nvidia-smi "
                 f"-c DEFAULT', {OTHERWISE}"
             )
