@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import bywire
-from bywire.api.design import Probability
+from bywire.api.design_probability import Probability
 from bywire.api.loop_case import loop_case
 from bywire.core.errors import ParameterError
 from bywire.core.typing import silent
@@ -52,7 +52,7 @@ def test_models_are_counted_by_what_they_meet():
 
 def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
     """And a margin that half of the models miss is not."""
-    monkeypatch.setattr("bywire.api.design._JUDGES", 48)
+    monkeypatch.setattr("bywire.api.design_probability._JUDGES", 48)
     with few_starts():
         found = bywire.design(
             "current",

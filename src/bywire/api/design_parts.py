@@ -259,6 +259,7 @@ def as_object(
                 for binding in design.binding
             ],
             "unsound": dict(design.unsound),
+            **({"missed_by_models": dict(design.missed)} if design.missed else {}),
             "conflicts": [
                 {
                     "requirement": str(conflict.wanted),
@@ -304,7 +305,7 @@ def as_parts(
         for name in sorted(LOOP_FIGURES, key=lambda name: name not in wanted)
     ]
     parts.append(text_table(["linear model", "nominal", "worst", "at", "limit"], figures))
-    parts += _kept_lines(design) + _unsound_lines(design)
+    parts += _kept_lines(design) + _unsound_lines(design) + _missed_lines(design)
     parts += [
         f"{'binds' if design.binds else 'tightest'}: {binding.requirement}, "
         f"{_figure_text(binding.requirement.figure, binding.value)} at {binding.case}"
@@ -326,6 +327,16 @@ def _kept_lines(design: Design) -> list[str]:
         return []
     texts = ", ".join(str(requirement) for requirement in design.kept)
     return [f"also enforced: {texts} (to change a limit, add a requirement)"]
+
+
+def _missed_lines(design: Design) -> list[str]:
+    """Return a line for each requirement with a probability that some models miss."""
+    return [
+        f"{text}: {count} of the models for choosing the gains miss this limit, as its probability "
+        "permits. The worst value above does not include them"
+        for text, count in design.missed.items()
+        if count and design.status == "met"
+    ]
 
 
 def _unsound_lines(design: Design) -> list[str]:
