@@ -12,10 +12,18 @@ from scipy.stats import norm
 
 import bywire
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.api.design_probability import Probability, _deciding
+from bywire.api.design_probability import (
+    BenchProbability,
+    DrawnModels,
+    Probability,
+    _deciding,
+    bench_probability,
+)
 from bywire.api.loop_case import loop_case
+from bywire.bench.bench import Bench
 from bywire.core.errors import ParameterError
 from bywire.core.typing import silent
+from bywire.studies.study_file import read_study
 from bywire.synthesis.designer import Problem, design
 from bywire.synthesis.linear_case import NOMINAL, LinearCase, cases_of, read
 from bywire.synthesis.outcome import Judged, judged_over
@@ -246,3 +254,45 @@ def test_without_probabilities_there_are_no_verdicts(found):
 def test_enough_models_decide_a_probability():
     """Without a failure, log(0.025) / log(0.99) = 368 models show 99 % with 95 % confidence."""
     assert [_deciding(0.99, missing, 0.95) for missing in (0, 2)] == [368, 720]
+
+
+def test_the_bench_has_the_last_word_on_figures_of_its_step(study):
+    """Its cases are draws that were not used before, and its limits have the units of the bench."""
+    case = loop_case("current", "", "", {})
+    plan = replace(read_study(study()), design="monte-carlo")
+    drawn = DrawnModels(plan, (first_order("drawn", 1.0, 2),), 1, (None,) * 20)
+    gains = {"ecu.current.k_p": 0.03, "ecu.current.k_i": 19.0}
+    bench = Bench(case.loop.proof, case.name)
+
+    def over(*texts: str) -> BenchProbability | None:
+        wanted = read(texts, has_probabilities=True)
+        return bench_probability(drawn, wanted, bench, gains, None)
+
+    assert over("overshoot <= 9 %") is None
+    assert over("phase_margin >= 60 deg with 90 %") is None
+    found = over("phase_margin >= 60 deg", "steady_state_error <= 50 % with 90 %")
+    assert found is not None
+    (judgment,) = found.findings.judgments
+    assert found.outcomes == {"steady_state_error <= 50 % with 90 %": "met"}
+    assert (judgment.demand.bound, judgment.demand.unit) == (pytest.approx(0.5 * 0.73), "A")
+    assert found.findings.count == 64
+    assert found.findings.cases["case"].iloc[0] == 64  # the first chunk has the designed models
+    assert found.findings.cases["motor.R_m"].iloc[0] == plan.values(1)["motor.R_m"][0]
+    values = np.sort(found.findings.figure("overshoot"))
+    middle = 0.5 * (values[31] + values[32])
+    assert middle > 0.1
+    median = over(f"overshoot <= {middle} % with 90 %", "settling_time <= 1 s")
+    assert median is not None
+    assert [*median.outcomes.values()] == ["missed", "met"]
+    (missed, _) = median.findings.judgments
+    assert (missed.share.count, missed.share.cases) == (32, 64)
+    assert median.reached(missed.demand) == values[62]  # 62 of 64 cases do not prove 90 %
+    text = str(missed.demand)
+    linear = Probability(drawn, (missed.demand,), Judged(20, 0, (20,), 20, (0.0,)), None)
+    remark = median.remark(text, linear)
+    assert "missed on the bench, with a probability of 50" in remark
+    assert "On the linear models, it is undecided with 100 %" in remark
+    assert f"The gains meet overshoot <= {values[62]:.3g}" in remark
+    tables = [part for part in median.parts() if not isinstance(part, str)]
+    assert [column.heading for column in tables[0].columns][-1] == "result"
+    assert median.data()["requirements"][0]["reached"] == values[62]

@@ -458,27 +458,40 @@ class BenchProbability:
         reached = self.reached(demand)
         if math.isnan(reached):
             return texts[0]
-        share_text = "all" if demand.probability is None else f"{100.0 * demand.probability:.10g} %"
-        texts.append(
-            f"{share_text} of the cases have {demand.figure} {demand.compare} "
-            f"{self._shown(demand, reached)}, and the nominal bench has "
-            f"{self._shown(demand, nominal)}"
+        share_text = (
+            ""
+            if demand.probability is None
+            else str(demand).removeprefix(f"{demand.figure} {demand.text}")
         )
-        left = nominal + demand.bound - reached  # if the scatter does not change
-        if left > 0.0 and not demand.is_met(reached):
+        texts.append(
+            f"The gains meet {demand.figure} {demand.compare} {self._shown(demand, reached)}"
+            f"{share_text}, and the nominal bench has {self._shown(demand, nominal)}"
+        )
+        stricter = 2.0 * demand.bound - reached
+        if 0.0 < stricter < demand.bound:
             texts.append(
-                "To leave room for this scatter, design with "
-                f"{demand.figure} {demand.compare} {self._shown(demand, left)}"
+                "To leave room for the scatter, design with a stricter limit, such as "
+                f"{demand.figure} {demand.compare} {self._shown(demand, stricter)}{share_text}"
             )
         return ". ".join(texts)
 
     def reached(self, demand: Limit) -> float:
-        """Return the limit that enough cases meet, in the figure's unit; NaN if there is none."""
+        """Return the strictest limit that the cases certainly meet with the required probability.
+
+        In the figure's unit; NaN if there are too few cases, or too many lack the figure.
+        """
         values = self.findings.figure(demand.figure)
-        worst_last = np.sort(values if demand.is_upper else -values)  # undefined ones are last
-        wanted = 1.0 if demand.probability is None else demand.probability
-        value = worst_last[max(math.ceil(wanted * values.size - 1e-9), 1) - 1]
-        return float(value if demand.is_upper else -value)
+        ascending = np.sort(values if demand.is_upper else -values)  # undefined ones are last
+        wanted, confidence = demand.probability, self.findings.plan.confidence
+        count = values.size
+        if wanted is not None:
+            sizes = range(count + 1)
+            count = bisect_left(
+                sizes, True, key=lambda met: share(met, values.size, confidence).low >= wanted
+            )
+        if not 0 < count <= values.size:
+            return math.nan
+        return float(ascending[count - 1] if demand.is_upper else -ascending[count - 1])
 
     def _nominal(self, figure: str) -> float:
         return next(kpi.value for kpi in self.findings.nominal if kpi.name == figure)
