@@ -27,6 +27,7 @@ from bywire.studies.study_file import read_study
 from bywire.synthesis.designer import Problem, design
 from bywire.synthesis.linear_case import NOMINAL, LinearCase, cases_of, read
 from bywire.synthesis.outcome import Judged, judged_over
+from bywire.synthesis.verification import corners_of
 from few_starts import few_starts
 from raising import raises
 
@@ -296,3 +297,12 @@ def test_the_bench_has_the_last_word_on_figures_of_its_step(study):
     tables = [part for part in median.parts() if not isinstance(part, str)]
     assert [column.heading for column in tables[0].columns][-1] == "result"
     assert median.data()["requirements"][0]["reached"] == values[62]
+
+
+@pytest.mark.parametrize(("text", "labels"), [("", {"a", "c", "d"}), (" with 90 %", {"a", "c"})])
+def test_a_drawn_model_is_a_corner_of_the_bench_unless_it_may_miss(text, labels):
+    ranges = [replace(first_order(n, 1.0), changes={"x": k}) for k, n in enumerate("abc")]
+    drawn = replace(first_order("d", 2.0, 1), changes={"y": 1.0})
+    wanted = read([f"crossover <= 20 Hz{text}"], has_probabilities=True)
+    problem = Problem({"k": (1.0, 500.0)}, wanted, (CASES[0], *ranges, drawn))
+    assert {case.label for case in corners_of(problem, {"k": 10.0})} == labels

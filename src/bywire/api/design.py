@@ -233,6 +233,11 @@ class DesignAnswer(Answer):
         return "interrupted" if tuning is not None and tuning.interrupted else self.linear.status
 
     @property
+    def outcomes(self) -> Mapping[str, Outcome]:
+        """Verdicts over distributions by requirement; empty if none has a probability."""
+        return {}
+
+    @property
     def notes(self) -> list[str]:
         """Notes on the side of a kink that the linear models use."""
         loop, par = self.case.loop, self.case.par.replace(self.gains)
@@ -278,7 +283,9 @@ class DesignAnswer(Answer):
 
     def _brief(self, parts: Sequence[Part], verdict: str) -> list[str | Block]:
         """Return verdict, requirements and gains. The rest needs ``--verbose``."""
-        table = design_parts.requirement_table(self.requirements, self.worst, self.tried)
+        table = design_parts.requirement_table(
+            self.requirements, self.worst, self.tried, self.outcomes
+        )
         first = self.first_parts(parts)
         rest = [part for part in parts if not any(part is each for each in first)]
         point = f"loop {self.case.loop.name} of {self.case.name} at {self.points}: {verdict}"
@@ -391,10 +398,7 @@ class LoopDesign(DesignAnswer):
 
     @property
     def outcomes(self) -> Mapping[str, Outcome]:
-        """Verdicts over the distributions by requirement; the bench decides if it has the figure.
-
-        Empty if no requirement has a probability.
-        """
+        """Verdicts over distributions by requirement; the bench decides if it has the figure."""
         linear = {} if self.probability is None else self.probability.outcomes
         return {**linear, **({} if self.on_bench is None else self.on_bench.outcomes)}
 

@@ -16,6 +16,7 @@ from bywire.core.units import shown
 from bywire.report.document import Block, Flat, Listing, TableBlock
 from bywire.report.tables import OUTCOMES, Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
+from bywire.studies.statistics import Outcome
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
 from bywire.synthesis.schedules import scheduled
@@ -372,11 +373,15 @@ def _gain_text(case: LoopCase, name: str, value: float) -> str:
 
 
 def requirement_table(
-    requirements: Sequence[Limit], worst: Callable[[str], float], tried: Verification | None
+    requirements: Sequence[Limit],
+    worst: Callable[[str], float],
+    tried: Verification | None,
+    outcomes: Mapping[str, Outcome],
 ) -> Table:
     """Return a row for each requirement and each figure also enforced, with the verdict first.
 
-    ``worst(figure)``: worst value on the linear model, which decides if the bench was skipped.
+    ``worst(figure)``: worst value on the linear model, which decides if the bench was skipped;
+    ``outcomes``: verdicts over distributions by requirement, which only limit a met requirement.
     """
     every = [*requirements, *(() if tried is None else tried.kept)]
     rows = []
@@ -390,6 +395,8 @@ def requirement_table(
             room = f"{100.0 * tried.final.room(text):+.1f} %"
             where = judged_on(tried.final, text)
         verdict = OUTCOMES["met" if is_met else "missed"]
+        if is_met and outcomes.get(text, "met") != "met":
+            verdict, where = OUTCOMES[outcomes[text]], "over the distributions"
         rows.append([verdict, text, linear, room, where])
     heading = ["verdict", "requirement", "linear model, worst", "margin to the limit", "judged"]
     return text_table(heading, rows)

@@ -573,11 +573,11 @@ def corners_of(problem: Problem, gains: Mapping[str, float]) -> list[LinearCase]
     others = [problem.cases[k] for k in places]
     slacks = problem.slacks(problem.point(gains), places).min(axis=1)
     order = [others[k] for k in slacks.argsort(kind="stable")]
-    values = [_coordinates(case) for case in others]
-    ends = {
-        name: (min(row[name] for row in values), max(row[name] for row in values))
-        for name in values[0]
-    }
+    values: dict[str, list[float]] = {}
+    for case in others:
+        for name, value in _coordinates(case).items():
+            values.setdefault(name, []).append(value)
+    ends = {name: (min(each), max(each)) for name, each in values.items()}
     corners = [
         case
         for case in order
