@@ -11,14 +11,16 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.signals import Role, signals_of
 from bywire.simulation.run import Run
 from bywire.simulation.run_table import change, one_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _PREFIX = "energy_"
 _ROLE = tuple(each.name for each in fields(Role))

@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Any, NamedTuple, cast, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
@@ -41,6 +40,9 @@ from bywire.simulation.ensemble import Ensemble, RunGroup, Variations, fit_lanes
 from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.run_table import change, parameters_of
 from bywire.simulation.run_table import one_of as one_run
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def varied_choices(bench: Bench) -> Mapping[str, tuple[Any, ...]]:
@@ -102,6 +104,8 @@ class BenchEnsemble:
         each = [result.recording for result in self.results]
         if signal not in each[0]:
             raise unknown_name("signal", signal, map(str, each[0].data_vars))
+        import xarray as xr  # slow to load
+
         joined = xr.concat([recording[signal] for recording in each], dim="case", join="outer")
         return joined.assign_coords({name: ("case", v) for name, v in self.variations.items()})
 
@@ -392,6 +396,7 @@ def rounds(
     threads: int | None = None,
     signals: Callable[[Run], Wanted | None] = lambda _: None,
     limits: Sequence[Mapping[str, float]] = (),
+    hold: bool = False,
 ) -> Iterator[Round]:
     """Yield the first run of all benches, then the second run, and so on.
 
@@ -408,6 +413,8 @@ def rounds(
         ``signals(run)``: outputs to record of runs side by side; None for all.
     limits
         Maximum work of each bench's runs, by label (default: unlimited).
+    hold
+        Whether a graphics processor may hold the rows of a round until the next one.
 
     Raises
     ------
@@ -438,8 +445,11 @@ def rounds(
         if is_alike and len(runs) > 1 and fit_lanes(runs, kinds[0]):
             times = one.schedule().record_times - cases[0].settle
             first = int(np.searchsorted(times, -cases[0].keep - 1e-9))
-            group = simulate_group(runs, outputs, threads, report, first, kinds[0], ends)
-            yield Round(places, cases, runs, group)
+            group = simulate_group(runs, outputs, threads, report, first, kinds[0], ends, hold)
+            try:
+                yield Round(places, cases, runs, group)
+            finally:
+                group.close()
         else:
             yield Round(places, cases, runs, _one_by_one(runs, report, kinds))
 
@@ -535,7 +545,7 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
     wanted = set() if families is None else families.signals(options)
     signals = partial(needed, wanted) if families is not None else lambda _: None
     figures: tuple[KpiOfCases, ...] | None = None
-    for made in rounds(benches, threads=threads, signals=signals):
+    for made in rounds(benches, threads=threads, signals=signals, hold=families is not None):
         group = made.trajectories
         if not isinstance(group, RunGroup):
             _recorded(benches, made, recordings, warnings)
@@ -577,13 +587,13 @@ def _books(made: Round, group: RunGroup, rows: Rows, threads: int | None) -> lis
     For most runs, the two ends rule out such warnings. Otherwise, all rows are computed.
     """
     if group.end_names:
-        if are_surely_sound(cast(xr.Dataset, ends_of_group(group)), made.runs):
+        if are_surely_sound(cast("xr.Dataset", ends_of_group(group)), made.runs):
             return [[] for _ in made.places]
         one = one_run(made.runs)
         every, first = energy_signals(one), one.schedule().rows
         group = simulate_group(made.runs, every, threads, first=first - group.time.size)
         rows = rows_of_group(group, made.cases[0].settle)
-    return energy_doubts_of_cases(cast(xr.Dataset, rows), len(made.runs), made.runs)
+    return energy_doubts_of_cases(cast("xr.Dataset", rows), len(made.runs), made.runs)
 
 
 def _recorded(

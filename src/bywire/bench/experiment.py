@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import lru_cache
 from string import Formatter
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
@@ -30,6 +29,9 @@ from bywire.simulation.advance import Change
 from bywire.simulation.noise import Noise, put_noise
 from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # --- Summaries: one line on an experiment, with the values of its options
 
@@ -116,7 +118,7 @@ def _value_text(value: Any, symbol: str, unit: str) -> str:
 
 # --- Experiments
 
-Recordings = Mapping[str, xr.Dataset]
+Recordings = Mapping[str, "xr.Dataset"]
 _LENGTHENED = 100.0  # maximum settling until all sample times coincide, relative to the run
 
 

@@ -52,9 +52,9 @@ class JoinedBenches(Sequence[Bench]):
     def __getitem__(self, k: slice) -> JoinedBenches: ...
 
     def __getitem__(self, k: int | slice) -> Bench | JoinedBenches:
+        if isinstance(k, int):
+            return self.build(range(len(self))[k])
         places = range(len(self))[k]
-        if isinstance(places, int):
-            return self.build(places)
         return JoinedBenches(lambda j: self.build(places[j]), self.like, self.runs[k])
 
 

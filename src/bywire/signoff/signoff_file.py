@@ -199,8 +199,8 @@ def _together(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
             other = first.setdefault(task.shelf, replace(each, task=task))
             if other.task.digest != task.digest:
                 raise ParameterError(
-                    f"[[evidence]] repeats the computation of {other.place} with other settings. Use "
-                    "the same settings in both, or remove one of them",
+                    f"[[evidence]] repeats the computation of {other.place} with other settings. "
+                    "Use the same settings in both, or remove one of them",
                     name="[[evidence]]",
                     value=task.title,
                 )

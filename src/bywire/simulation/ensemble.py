@@ -12,13 +12,14 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, not_valid, unknown_name
 from bywire.core.interrupts import thread_pool
+from bywire.core.on_demand import OnDemand
 from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
 from bywire.simulation.advance import (
@@ -47,6 +48,9 @@ from bywire.simulation.run import (
 )
 from bywire.simulation.run_table import RunTable, change, one_of
 from bywire.simulation.schedule import COUNTERS, Schedule
+
+if TYPE_CHECKING:
+    from bywire.simulation.cuda import HeldRows
 
 # Maximum number of intervals of a run, and minimum number of substeps per interval. Between
 # intervals, the run reports progress and handles interrupts, which takes as long as a hundred
@@ -87,7 +91,8 @@ class RunGroup(Sequence[Trajectory]):
         Times of the rows [s], shape (rows,).
     values
         Signals, each contiguous over all runs, shape (signals, runs, rows). If runs have changes
-        and the stored energy is recorded, the last signal is the work of the changes.
+        and the stored energy is recorded, the last signal is the work of the changes. Rows that a
+        graphics processor holds are fetched on first use.
     names
         Names of the signals, in the order of the first axis.
     vectors
@@ -101,7 +106,7 @@ class RunGroup(Sequence[Trajectory]):
 
     runs: Sequence[Run]
     time: Array
-    values: Array
+    values: Array | HeldRows
     names: tuple[str, ...]
     vectors: Array
     kernel: CaseKernel
@@ -112,6 +117,33 @@ class RunGroup(Sequence[Trajectory]):
     def unsettled(self) -> NDArray[np.int64]:
         """Substeps of each run that hit the contact iteration's limit, shape (runs,)."""
         return np.asarray(self.vectors[self.kernel.layout.start["counters"]], dtype=np.int64)
+
+    @property
+    def signals(self) -> Mapping[str, Array]:
+        """Signals by name, shape (runs, rows)."""
+        if isinstance(self.values, np.ndarray):
+            return dict(zip(self.names, self.values, strict=True))
+        signal, places = self.values.signal, {name: k for k, name in enumerate(self.names)}
+        return OnDemand(places, lambda name: signal(places[name]))
+
+    @property
+    def edges(self) -> Mapping[str, Array]:
+        """First and last row of each signal by name, shape (runs, 2)."""
+        if isinstance(self.values, np.ndarray):
+            both = self.values[:, :, [0, -1]]
+        else:
+            both = self.values.extremes[:, :, [0, -1]]
+        return dict(zip(self.names, both, strict=True))
+
+    @property
+    def held(self) -> HeldRows | None:
+        """The rows that a graphics processor holds; None for an array."""
+        return None if isinstance(self.values, np.ndarray) else self.values
+
+    def close(self) -> None:
+        """Free rows that a graphics processor holds, which cannot be fetched any more."""
+        if not isinstance(self.values, np.ndarray):
+            self.values.close()
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -149,6 +181,7 @@ def simulate_group(
     first: int = 0,
     engine: str = "auto",
     ends: Sequence[str] = (),
+    hold: bool = False,
 ) -> RunGroup:
     """Compute runs side by side, each with its own parameters, initial values and stimulus.
 
@@ -170,6 +203,8 @@ def simulate_group(
     ends
         Additional outputs to record only in the first and last rows. This requires runs without
         changes.
+    hold
+        Whether a graphics processor may hold the rows until they are read; see `RunGroup.close`.
 
     Raises
     ------
@@ -209,8 +244,11 @@ def simulate_group(
     jumping = energies(output, wanted) if change(runs) else np.empty((0, 0))
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
     recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
-    values = kernel.array((len(recorded), len(runs), schedule.rows - first))
-    values[len(wanted) :] = 0.0  # sums up the work of changes
+    shape = len(recorded), len(runs), schedule.rows - first
+    held = kernel.hold(shape) if hold and not any(run.changes for run in runs) else None
+    values: Array | HeldRows = kernel.array(shape) if held is None else held
+    if isinstance(values, np.ndarray):
+        values[len(wanted) :] = 0.0  # sums up the work of changes
     at_ends = np.zeros((len(ends), len(runs), 2))
     frames = (first * schedule.record_frames, (schedule.rows - 1) * schedule.record_frames)
 
@@ -220,7 +258,8 @@ def simulate_group(
         cases = slice(begin, begin + kernel.lanes)
         carried = _Carried(kernel, schedule, runs[cases], jumping, room)
         apart = Ends(at_ends[:, cases], frames) if ends else None
-        return carried.to_the_end(values[:, cases], edges, first, watch, apart)
+        part = values[:, cases] if isinstance(values, np.ndarray) else values
+        return carried.to_the_end(part, edges, first, watch, apart)
 
     with thread_pool(threads or kernel.at_once) as pool:
         vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
@@ -374,8 +413,8 @@ class _Carried:
         self._changes: dict[int, list[tuple[int, ParameterSet]]] = {}
         if isinstance(group, RunTable):
             lanes = np.minimum(np.arange(width), self._count - 1)  # idle lanes repeat the last run
-            states, memories = group.states[lanes], group.memories[lanes]
-            self._vector = initial_vectors(kernel.layout, states, memories).T.copy()
+            vector = initial_vectors(kernel.layout, group.states[lanes], group.memories[lanes])
+            self._vector = vector.T.copy()
             self._parameters = group.parameters[lanes].T.copy()
             self._stimulus = _shared_stimuli(group, kernel, room)
             self._most = np.full(width, group.like.most_work)
@@ -391,17 +430,25 @@ class _Carried:
         self._most = np.array([run.most_work for run in filled])
 
     def to_the_end(
-        self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch, ends: Ends | None
+        self,
+        values: Array | HeldRows,
+        edges: Sequence[int],
+        skipped: int,
+        watch: _Watch,
+        ends: Ends | None,
     ) -> Array:
         """Advance the runs to their end; fill ``values`` and return the state vectors."""
         schedule, every = self._schedule, self._schedule.record_frames
         silent = replace(schedule, record_frames=schedule.frames + 1)  # except for the first row
         for begin, end in pairwise(edges):
             first = -(-begin // every) - skipped
-            self._change(begin, values[:, :, max(first, 0) :])
+            if begin in self._changes and isinstance(values, np.ndarray):
+                self._change(begin, values[:, :, max(first, 0) :])
             last = (schedule.rows if end == schedule.frames else -(-end // every)) - skipped
             signals = values.shape[0] - self._books
-            if first >= 0:
+            if first >= 0 and not isinstance(values, np.ndarray):
+                self._advance(schedule, values.window(first), begin, end, ends)
+            elif first >= 0:
                 rows = values[:signals, :, first : max(last, first + 1)].transpose(1, 2, 0)
                 self._advance(schedule, rows, begin, end, ends)
             else:
@@ -418,9 +465,7 @@ class _Carried:
 
     def _change(self, begin: int, rows: Array) -> None:
         """Set the parameters that apply from a frame, and record the work of the change."""
-        here = self._changes.get(begin, ())
-        if not here:
-            return
+        here = self._changes[begin]
         before = self._energies(rows) if self._books and begin else None
         for lane, par in here:
             self._parameters[:, lane] = list(par.leaves().values())
@@ -437,7 +482,7 @@ class _Carried:
         return np.array([row[:, 0, book > 0].sum(axis=-1) for book in self._jumping])
 
     def _advance(
-        self, plan: Schedule, rows: Array, begin: int, end: int, ends: Ends | None = None
+        self, plan: Schedule, rows: Any, begin: int, end: int, ends: Ends | None = None
     ) -> None:
         self._kernel.advance(
             plan, self._parameters, self._stimulus, self._vector, rows, end, begin, ends

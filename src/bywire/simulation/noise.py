@@ -1,4 +1,4 @@
-"""Standard normal noise of many runs, in C: the samples of NumPy's generators, bit by bit.
+"""Standard normal noise of many runs, in C: the samples of NumPy's generators, bit for bit.
 
 NumPy takes about 12 ns per sample, because its branch on the sign is wrong half of the time. The C
 code here takes 2.5 ns: it advances the generators of four signals alternately, sets the sign

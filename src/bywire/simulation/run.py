@@ -128,7 +128,9 @@ def initial_vector(layout: Layout, state: Sequence[float], memory: Sequence[floa
     return np.asarray(initial_vectors(layout, [state], [memory])[0])
 
 
-def initial_vectors(layout: Layout, states: Sequence[Any], memories: Sequence[Any]) -> Array:
+def initial_vectors(
+    layout: Layout, states: Sequence[Any] | Array, memories: Sequence[Any] | Array
+) -> Array:
     """Return the state vectors at the start of several runs, shape (runs, entries)."""
     vectors = np.zeros((len(states), layout.total))
     for kind, values in (("x", np.array(states)), ("m", np.array(memories))):
