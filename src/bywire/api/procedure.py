@@ -11,7 +11,7 @@ import numpy as np
 
 from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
-from bywire.core.units import difference_unit, unit_text
+from bywire.core.units import difference_unit, shown, unit_text
 from bywire.procedures.procedure_file import StopPlan
 from bywire.procedures.sequence import NOT_SHOWN, NotShown, Procedure, Stop
 from bywire.report.answer import Answer, FigureAt, Outcome, outcome_of
@@ -156,19 +156,19 @@ class ProcedureResult(Answer):
 
     def _stops(self) -> Table:
         figures = self.procedure.plan.demand_figures.units
-        shown = [
+        columns = [
             (name, heading)
             for name, heading in (*_COLUMNS, *((name, name) for name in figures))
             if any((kpi := stop.kpi(name)) and math.isfinite(kpi.value) for stop in self.stops)
         ]
-        heading = ["stop", "number", "speed", *(each for _, each in shown), "paragraph"]
+        heading = ["stop", "number", "speed", "conditions", *(each for _, each in columns)]
         rows = [
             (
                 stop.plan.name,
                 _numbered(stop),
                 _speed_cell(stop.plan),
-                *(_kpi_cell(stop, name) for name, _ in shown),
-                stop.plan.source or "-",
+                _conditions(stop) or "-",
+                *(_kpi_cell(stop, name) for name, _ in columns),
             )
             for stop in self.stops
         ]
@@ -296,6 +296,21 @@ def _speed_cell(plan: StopPlan) -> Cell:
     return Cell(f"{text} {unit_text('km/h')}")
 
 
+def _conditions(stop: Stop) -> str:
+    """Return the conditions of a stop in addition to its speed."""
+    plan = stop.plan
+    if plan.bench is None:
+        return f"missing: {', '.join(plan.lacking)}"
+    texts = [f"{name} = {value}" for name, value in plan.changes]
+    if plan.T_brake is not None and (stop.first == 1 or plan.interval is None):
+        texts.insert(0, f"discs at {shown(plan.T_brake, 'K')}")
+    elif plan.interval is not None and stop.begin > 0.0:
+        texts.insert(0, f"{shown(plan.interval, 's')} after the start of the stop before")
+    if plan.deceleration is not None:
+        texts.append(f"adjusted to {amount(plan.deceleration, 'm/s**2')}")
+    return ", ".join(texts)
+
+
 def _kpi_cell(stop: Stop, name: str) -> Cell:
     kpi, is_partial = stop.kpi(name), stop.plan.until > 0.0
     if kpi is None or not math.isfinite(kpi.value) or (is_partial and name in _OF_STANDSTILL):
@@ -326,6 +341,7 @@ def _stop_record(stop: Stop) -> dict[str, Any]:
         "interval": plan.interval,
         "T_brake": plan.T_brake,
         "deceleration": plan.deceleration,
+        "changes": dict(plan.changes),
     }
     return {
         "name": plan.name,

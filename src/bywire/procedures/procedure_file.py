@@ -17,6 +17,7 @@ from pydantic import Field
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.bench.changes import OPTION
 from bywire.bench.computation import bench_identity, functions_digest
 from bywire.bench.kpis.kpi import Figures
 from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
@@ -128,6 +129,8 @@ class StopPlan:
         Whether every stop adjusts the demand, instead of only the first.
     limits
         Limits of key figures.
+    changes
+        The user's changes for these stops.
     lacking
         Names of the missing numbers without which the stops cannot run.
     unknown
@@ -147,6 +150,7 @@ class StopPlan:
     deceleration: float | None = None
     adjusts_every: bool = False
     limits: tuple[SpeedLimit, ...] = ()
+    changes: tuple[tuple[str, str], ...] = ()
     lacking: tuple[str, ...] = ()
     unknown: tuple[tuple[str, str, str], ...] = ()
 
@@ -284,6 +288,7 @@ def _plan(
         for key, value in overrides.items()
         if key != MAXIMUM and not key.startswith(NUMBERS)
     }
+    _require_free(settings | of_bench)
     shared, lacking = _filled(settings | of_bench, known)
     if lacking:
         where = ", ".join(f"{NUMBERS}{each}" for each in lacking)
@@ -365,6 +370,16 @@ def _texts(changes: Mapping[str, Any], where: str) -> dict[str, str]:
     return flat
 
 
+def _require_free(changes: Mapping[str, str]) -> None:
+    """Reject a change of the initial speed, which the stops determine."""
+    if f"{OPTION}{SPEED}" in changes:
+        raise ParameterError(
+            f"{OPTION}{SPEED} would have no effect, because the speed of each stop determines it. "
+            "Change speed instead",
+            name=f"{OPTION}{SPEED}",
+        )
+
+
 def _filled(
     texts: Mapping[str, str], known: Mapping[str, str]
 ) -> tuple[dict[str, str], tuple[str, ...]]:
@@ -442,6 +457,7 @@ class _Reader:
             if getattr(section, key) is not None
         }
         changes = _texts(section.set, "set")
+        _require_free(changes)
         texts = {
             **{f"speed{k}": text for k, text in enumerate(speeds)},
             **given,
@@ -466,11 +482,8 @@ class _Reader:
             if key in filled
         }
         v_0 = min(self._speed(filled[f"speed{k}"]) for k in range(len(speeds)))
-        settings = {
-            **self.shared,
-            **{k.removeprefix(_SET): v for k, v in filled.items() if k.startswith(_SET)},
-        }
-        bench = bench_file.read(self.bench.experiment, settings)
+        own = {k.removeprefix(_SET): v for k, v in filled.items() if k.startswith(_SET)}
+        bench = bench_file.read(self.bench.experiment, {**self.shared, **own})
         bench = bench_with_speed(bench, v_0)
         motion = Motion.of(bench, v_0)
         limits, gaps = self._limits(section, bench, motion, v_0, before)
@@ -501,8 +514,8 @@ class _Reader:
             values.get("deceleration"),
             section.adjust == "every",
             limits,
-            (),
-            gaps,
+            tuple(own.items()),
+            unknown=gaps,
         )
 
     @staticmethod
