@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
-from bywire.core.units import difference_unit, shown, unit_text
+from bywire.core.errors import counted
+from bywire.core.units import difference_unit, unit_text
 from bywire.procedures.procedure_file import StopPlan
 from bywire.procedures.sequence import NOT_SHOWN, NotShown, Procedure, Stop
 from bywire.report.answer import Answer, FigureAt, Outcome, outcome_of
@@ -98,7 +99,9 @@ class ProcedureResult(Answer):
     def document(self) -> Document:
         """Return the stops, the limits with their verdicts, and the numbers with their sources."""
         plan = self.procedure.plan
-        subject = Subject.of_bench(plan.bench, plan.name, plan.title)
+        count = sum(stop.count for stop in self.stops)
+        summary = f"{counted(count, 'stop')} of {plan.bench.system} ({plan.bench.experiment})"
+        subject = Subject.of_bench(plan.bench, plan.name, summary)
         stops, limits = TableBlock(self._stops()), TableBlock(self._limits())
         warned = [Listing([f"Warning: {text}." for text in self.warnings])] if self.warnings else []
         absent = [Listing(plan.missing, "The procedure leaves out:")] if plan.missing else []
@@ -158,7 +161,10 @@ class ProcedureResult(Answer):
         figures = self.procedure.plan.demand_figures.units
         columns = [
             (name, heading)
-            for name, heading in (*_COLUMNS, *((name, name) for name in figures))
+            for name, heading in (
+                *_COLUMNS,
+                *((name, name.replace("_", " ", 1)) for name in figures),
+            )
             if any((kpi := stop.kpi(name)) and math.isfinite(kpi.value) for stop in self.stops)
         ]
         heading = ["stop", "number", "speed", "conditions", *(each for _, each in columns)]
@@ -172,7 +178,9 @@ class ProcedureResult(Answer):
             )
             for stop in self.stops
         ]
-        return text_table(heading, rows)
+        table = text_table(heading, rows)
+        marked = [replace(c, is_detail=c.heading == "conditions") for c in table.columns]
+        return replace(table, columns=tuple(marked))
 
     def _limits(self) -> Table:
         heading = ("stop", "number", "figure", "value", "limit", "margin", "verdict", "paragraph")
@@ -303,9 +311,9 @@ def _conditions(stop: Stop) -> str:
         return f"missing: {', '.join(plan.lacking)}"
     texts = [f"{name} = {value}" for name, value in plan.changes]
     if plan.T_brake is not None and (stop.first == 1 or plan.interval is None):
-        texts.insert(0, f"discs at {shown(plan.T_brake, 'K')}")
+        texts.insert(0, f"discs at {amount(plan.T_brake, 'K')}")
     elif plan.interval is not None and stop.begin > 0.0:
-        texts.insert(0, f"{shown(plan.interval, 's')} after the start of the stop before")
+        texts.insert(0, f"{amount(plan.interval, 's')} after the previous start")
     if plan.deceleration is not None:
         texts.append(f"adjusted to {amount(plan.deceleration, 'm/s**2')}")
     return ", ".join(texts)

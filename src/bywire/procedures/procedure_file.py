@@ -19,6 +19,7 @@ from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.bench.changes import OPTION
 from bywire.bench.computation import bench_identity, functions_digest
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.kpis.kpi import Figures
 from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
@@ -29,7 +30,9 @@ from bywire.data.toml_file import PROCEDURE, entry_lines, read_toml, require_kin
 from bywire.procedures.formula import SpeedLimit, read_speed_limit
 from bywire.procedures.motion import SPEED, Motion
 
-_Quoted = Annotated[str, Hint("write it in quotation marks, with its unit")]
+_QUOTED = Hint("write it in quotation marks, with its unit")
+_Quoted = Annotated[str, _QUOTED]
+_QuotedOrNone = Annotated[str | None, _QUOTED]
 _BRACES = re.compile(r"\{(\w+)\}")
 _OF_MAXIMUM = re.compile(r"([^%]*%)\s*of\s+v_max\s*")
 NUMBERS, MAXIMUM = "numbers.", "v_max"
@@ -41,7 +44,7 @@ _MOST = 200  # stops under the same conditions
 class NumberSection(Section):
     """A section ``[numbers.NAME]``: a number with its source, or one that is missing."""
 
-    value: Annotated[str | None, Hint("write it in quotation marks, with its unit")] = None
+    value: _QuotedOrNone = None
     source: Annotated[str | None, Hint("write the document and the paragraph")] = None
     missing: Annotated[str | None, Hint("write where the number stands")] = None
 
@@ -52,12 +55,12 @@ class StopSection(Section):
     name: Annotated[Name, Hint("write a name that is not blank")]
     source: str = ""
     speed: Annotated[Any, Field()] = None
-    until: _Quoted | None = None
+    until: _QuotedOrNone = None
     count: Annotated[Any, Field()] = 1
-    interval: _Quoted | None = None
-    cooling_speed: _Quoted | None = None
-    T_brake: _Quoted | None = None
-    deceleration: _Quoted | None = None
+    interval: _QuotedOrNone = None
+    cooling_speed: _QuotedOrNone = None
+    T_brake: _QuotedOrNone = None
+    deceleration: _QuotedOrNone = None
     adjust: Literal["first", "every"] = "first"
     judged: bool = True
     set: Table
@@ -297,6 +300,8 @@ def _plan(
             name="set",
             valid=where,
         )
+    if not bench_file.names_experiment(file.experiment):
+        raise unknown_name("experiment", file.experiment, EXPERIMENTS.all())
     bench = bench_file.read(file.experiment, shared)
     options = leaf_fields(bench.definition.options)
     if SPEED not in options or options[SPEED].unit.symbol != "m/s":
