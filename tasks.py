@@ -79,6 +79,7 @@ NEWEST_TESTS = [
         "vehicle",
         "reproduction/test_item.py",
         "api/test_api_run_report.py",
+        "signoff/test_verdicts.py",
         "usecases/test_declared.py",
     )
 ]

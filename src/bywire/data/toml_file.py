@@ -117,19 +117,7 @@ def _require_numbers(value: Any, file: Path, key: str) -> None:
 
 
 def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str) -> str:
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
-        hint = missing(file) if isinstance(error, FileNotFoundError) else _ADVICE
-        raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
-    if len(data) > LARGEST:
-        raise FileError(
-            f"{file} is larger than {LARGEST // 1000} kB, which is too large for a {kind}"
-            f"{too_large}",
-            name=str(file),
-        )
+    data = limited_bytes(file, kind, missing=missing, too_large=too_large)
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError:
@@ -138,6 +126,47 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
             "file",
             name=str(file),
         ) from None
+
+
+def limited_bytes(
+    file: Path,
+    kind: str,
+    most: int = LARGEST,
+    *,
+    missing: Callable[[Path], str] = _no_idea,
+    too_large: str = "",
+) -> bytes:
+    """Return the content of a file of limited size.
+
+    Parameters
+    ----------
+    file
+        Path of the file.
+    kind
+        Its name in errors.
+    most
+        Maximum size in bytes.
+    missing, too_large
+        Next steps, see `read_toml`.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read or is too large.
+    """
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(most + 1)
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
+        hint = missing(file) if isinstance(error, FileNotFoundError) else _ADVICE
+        raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
+    if len(data) > most:
+        raise FileError(
+            f"{file} is larger than {most // 1000} kB, which is too large for a {kind}{too_large}",
+            name=str(file),
+        )
+    return data
 
 
 # --- Kinds of files

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+from bywire.analysis.loop import LOOPS
 from bywire.api.life import LIFE_FIGURES
 from bywire.api.loop_case import LoopCase
 from bywire.api.replay import driven_bench
@@ -89,9 +90,14 @@ class Kind:
         return use_cases()[self.use_case]
 
     @property
+    def subject_argument(self) -> Argument:
+        """The argument that the key in the file specifies."""
+        return next(a for a in self.case.arguments if a.argument == self.subject)
+
+    @property
     def key(self) -> str:
         """Name of the subject among the use case's fields."""
-        return next(a.name for a in self.case.arguments if a.argument == self.subject)
+        return self.subject_argument.name
 
     @cached_property
     def arguments(self) -> dict[str, Argument]:
@@ -131,11 +137,16 @@ def _read_loop(asked: Asked) -> LoopCase:
 def _loop_identity(case: LoopCase) -> Identity:
     return {
         "loop": case.loop.name,
-        "computed": functions_digest([case.loop], "bywire.analysis", with_equations=True),
+        "computed": _loop_digest(case.loop.name),
         "parameters": case.par.flat(),
         "at": case.value,
         "side": case.loop.side,
     }
+
+
+@cache
+def _loop_digest(name: str) -> str:
+    return functions_digest([LOOPS.find(name)], "bywire.analysis", with_equations=True)
 
 
 def _loop_limit(case: LoopCase, text: str) -> Limit:
@@ -364,7 +375,7 @@ def read_kind(kind: str, subject: str, arguments: Mapping[str, Any], folder: Pat
         if name not in chosen.arguments:
             raise unknown_of_few(f"key of [[evidence]] {kind}", name, (*chosen.arguments, *_OTHERS))
     asked = {name: value_of(chosen.arguments[name], v, folder) for name, v in arguments.items()}
-    asked[chosen.key] = there(subject, folder)
+    asked[chosen.key] = there(subject, chosen.subject_argument, folder)
     return UseCaseTask(kind, subject, arguments, folder, asked, chosen.read(asked))
 
 

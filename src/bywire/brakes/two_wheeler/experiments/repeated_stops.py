@@ -11,10 +11,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings, as_run
@@ -35,6 +34,9 @@ from bywire.simulation.engine import prepare
 from bywire.simulation.run import simulate
 from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.two_wheeler import cold_start
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Heat = Mapping[str, disc_heat.State]
 """brake temperatures by part"""
@@ -242,6 +244,8 @@ def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]
 
 
 def _dataset(par: TwoWheelerParameters, pieces: list[dict[str, Array]]) -> xr.Dataset:
+    import xarray as xr  # slow to load
+
     known = signals_of(TwoWheelerByWire.Output) | {"stop": _STOP}
     names = ("time", "v", "stop", *TEMPERATURES)
     rows = {name: np.concatenate([each[name] for each in pieces]) for name in names}
