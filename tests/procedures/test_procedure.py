@@ -257,6 +257,8 @@ HOT = 'name = "cold"\nspeed = "60 km/h"\nlimits.mfdd = ">= 1 m/s^2"\n'
         (HEAD + f"[[stops]]\n{HOT}interval = '-3 s'", "interval = '-3 s' .* > 0 s"),
         (HEAD + f"[[stops]]\n{HOT}interval = '3 m'", "cannot be converted to s"),
         (HEAD + f"[[stops]]\n{HOT}interval = '3'", "interval"),
+        (HEAD + f"[[stops]]\n{HOT}interval = '25 h'", "interval = '25 h' .* <= 24 h"),
+        (HEAD + f"[[stops]]\n{HOT}cooling_speed = '201 km/h'", "cooling_speed .* <= v_max"),
         (HEAD + f"[[stops]]\n{HOT}interval = 3", "interval = 3: write it in quotation marks"),
         (HEAD + f"[[stops]]\n{HOT}until = '50 km/h'", "a percentage"),
         (HEAD + f"[[stops]]\n{HOT}set.'options.v_0' = '3 m/s'", "Change speed instead"),
@@ -312,6 +314,13 @@ def test_other_files_are_rejected_with_their_command(plan_of, tmp_path):
 def one_box():
     """Load the one-box brake."""
     bywire.load_system(ROOT / "examples/one_box")
+
+
+@pytest.mark.parametrize("key", ['T_brake = "350 K"', 'interval = "60 s"'])
+def test_brakes_that_do_not_warm_up_accept_no_temperatures(plan_of, one_box, key):
+    text = (ROOT / "examples/one_box/procedures/cold_effectiveness.toml").read_text()
+    with pytest.raises(InputError, match="would have no effect because the brakes"):
+        plan_of(text.replace("[[stops]]", f"[[stops]]\n{key}", 1))
 
 
 def test_a_procedure_is_evidence_that_changes_with_its_content(plan_of, tmp_path):

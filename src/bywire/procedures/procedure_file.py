@@ -39,6 +39,7 @@ NUMBERS, MAXIMUM = "numbers.", "v_max"
 """prefix of the names of numbers, and name of the maximum speed, in changes of a procedure"""
 _SET = "set."
 _MOST = 200  # stops under the same conditions
+_LONGEST = 86400.0  # interval between stops [s]
 
 
 class NumberSection(Section):
@@ -486,6 +487,12 @@ class _Reader:
             for key, (symbol, nominal) in _UNITS.items()
             if key in filled
         }
+        if values.get("interval", 0.0) > _LONGEST:
+            raise not_valid(
+                "interval", quoted(filled["interval"]), f"<= {shown(_LONGEST, 's', 'h')}"
+            )
+        if "cooling_speed" in values:
+            self._require_reached("cooling_speed", filled["cooling_speed"], values["cooling_speed"])
         v_0 = min(self._speed(filled[f"speed{k}"]) for k in range(len(speeds)))
         own = {k.removeprefix(_SET): v for k, v in filled.items() if k.startswith(_SET)}
         bench = bench_file.read(self.bench.experiment, {**self.shared, **own})
@@ -542,10 +549,13 @@ class _Reader:
             if match
             else _positive(text, "m/s", "speed", 20.0)
         )
+        self._require_reached("speed", text, v)
+        return v
+
+    def _require_reached(self, key: str, text: str, v: float) -> None:
         if v > self.v_max:
             most = f"<= v_max = {shown(self.v_max, 'm/s', 'km/h')}"
-            raise not_valid("speed", quoted(text), most, "because the vehicle is not faster")
-        return v
+            raise not_valid(key, quoted(text), most, "because the vehicle is not faster")
 
     @staticmethod
     def _share(text: str, name: str) -> float:
