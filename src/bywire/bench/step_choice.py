@@ -373,9 +373,11 @@ class _Trials:
         return 1 + len(self._variations)
 
     def confirmed(self, step: float, stated: float) -> _Trial:
-        """Return the errors with a step, or with half of it if these are larger than stated.
+        """Return the errors with a step, confirmed with half of it if they are as small as stated.
 
-        A figure whose values scatter may meet the error by chance, but seldom with both steps.
+        A figure whose values scatter may meet the error by chance, and may appear to converge. If a
+        figure does not converge with one of both steps, its error is at least the root mean square
+        of both errors.
 
         Raises
         ------
@@ -383,11 +385,17 @@ class _Trials:
             When the bench itself fails with this step, or with a shorter one.
         """
         trial = self.at(step)
-        is_met = not trial.doubt and trial.errors.reached <= stated
-        if is_met and trial.errors.scattered and _HALF * step >= FINEST:
-            half = self.at(_HALF * step)
-            return trial if half.errors.reached <= stated else half
-        return trial
+        errors = trial.errors
+        if trial.doubt or errors.reached > stated or _HALF * step < FINEST:
+            return trial
+        half = self.at(_HALF * step).errors
+        if not half.each:
+            return trial
+        each, scattered = dict(errors.each), errors.scattered | half.scattered
+        for name in scattered:
+            square = 0.5 * (errors.each[name] ** 2 + half.each[name] ** 2)
+            each[name] = np.fmax(errors.each[name], np.sqrt(square))
+        return _Trial(step, Errors(each, scattered))
 
     def at(self, step: float) -> _Trial:
         """Return the errors with a step.
