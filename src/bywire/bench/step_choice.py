@@ -5,7 +5,7 @@ with each of them as `bywire.bench.step_error` does. The error of a figure is re
 magnitude, or to the maximum of the signals from which it is computed, if that is larger. A small
 difference of large signals, such as a steady-state error, is therefore judged like the signals.
 
-The choice depends only on the benches, and not on the machine or the engine.
+The choice is a function of the benches: the same bench always has the same step.
 """
 
 from __future__ import annotations
@@ -49,6 +49,7 @@ def with_chosen_step(
     bench: Bench,
     variations: Sequence[Mapping[str, Any]] = (),
     progress: Progress | None = None,
+    engine: str = "auto",
 ) -> Bench:
     """Return a bench with the longest step that meets its stated error.
 
@@ -64,6 +65,8 @@ def with_chosen_step(
         experiment rejects, or that fail with every step, do not count.
     progress
         Called with a label and the finished fraction, 0 to 1.
+    engine
+        Engine of the runs; ``auto`` uses the bench's engine.
 
     Raises
     ------
@@ -74,7 +77,8 @@ def with_chosen_step(
     """
     if bench.error is None or bench.choice is not None:
         return bench
-    return replace(bench, **_chosen(_Trials(bench, variations), progress))
+    tried = bench if engine == "auto" else replace(bench, engine=engine)
+    return replace(bench, **_chosen(_Trials(tried, variations), progress))
 
 
 def _chosen(trials: _Trials, progress: Progress | None) -> dict[str, Any]:
