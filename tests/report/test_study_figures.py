@@ -103,9 +103,7 @@ def every(met: NDArray[np.bool_]) -> DrawnCases:
     return drawn_cases(met, met.size, met.size)
 
 
-def histogram(
-    values: Array, unit: str, nominal: float, limit: float | None = None
-) -> Histogram:
+def histogram(values: Array, unit: str, nominal: float, limit: float | None = None) -> Histogram:
     ends = float(values.min()), float(values.max())
     edges = bin_edges(*ends, bin_count(values))
     band = (float(x) for x in np.quantile(values, (0.05, 0.95)))
@@ -149,7 +147,10 @@ def test_labels_of_a_histogram_never_touch(middle: float, spread: float, unit: s
 
 
 def test_a_histogram_names_a_limit_that_lies_far_off() -> None:
-    far, near = histogram(ERROR.values, "Pa", 250.0, 1e4), histogram(ERROR.values, "Pa", 250.0, 600.0)
+    far, near = (
+        histogram(ERROR.values, "Pa", 250.0, 1e4),
+        histogram(ERROR.values, "Pa", 250.0, 600.0),
+    )
     figure = drawn(histograms({"far": far, "near": near}))
     assert figure.axes[0].get_title(loc="right") == "limit 0.1 bar →"
     assert texts(figure.axes[0]) == texts(figure.axes[1]) == []
