@@ -147,10 +147,8 @@ def test_labels_of_a_histogram_never_touch(middle: float, spread: float, unit: s
 
 
 def test_a_histogram_names_a_limit_that_lies_far_off() -> None:
-    far, near = (
-        histogram(ERROR.values, "Pa", 250.0, 1e4),
-        histogram(ERROR.values, "Pa", 250.0, 600.0),
-    )
+    far = histogram(ERROR.values, "Pa", 250.0, 1e4)
+    near = histogram(ERROR.values, "Pa", 250.0, 600.0)
     figure = drawn(histograms({"far": far, "near": near}))
     assert figure.axes[0].get_title(loc="right") == "limit 0.1 bar →"
     assert texts(figure.axes[0]) == texts(figure.axes[1]) == []

@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bywire.api.run_sections import tested_brief, tested_data, tested_line, tested_section
+from bywire.api.run_sections import (
+    choice_data,
+    tested_brief,
+    tested_data,
+    tested_line,
+    tested_section,
+)
 from bywire.api.study_figures import load_drawing, study_figures
 from bywire.api.study_tables import (
     correlated,
@@ -47,7 +53,7 @@ from bywire.core.errors import FileError, InputError, ParameterError, unknown_na
 from bywire.core.parameters import field_notes
 from bywire.core.typing import Progress, silent
 from bywire.core.units import shown
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, Outcome
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -67,6 +73,7 @@ from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.running import complete
 from bywire.studies.sensitivity import VarianceShares
 from bywire.studies.sought_cases import rare_failures, worst_cases
+from bywire.studies.stated_error import ErrorCheck, error_check, with_step
 from bywire.studies.statistics import Spread
 from bywire.studies.store import Origin, StudyStore, case_bench
 from bywire.studies.stored_cases import BLOCK, stored_cases
@@ -437,6 +444,8 @@ class StudyRun(Answer):
         missing.
     damaged
         Number of chunks that bywire recomputed because their files were unreadable.
+    check
+        Numerical errors of some cases, if the bench states an error.
     """
 
     plan: StudyPlan
@@ -445,6 +454,7 @@ class StudyRun(Answer):
     nominal: Result
     status: str
     damaged: int = 0
+    check: ErrorCheck | None = None
 
     @cached_property
     def _shown(self) -> ShownCases:
@@ -507,6 +517,12 @@ class StudyRun(Answer):
         return self.status in ("done", "passed")
 
     @property
+    def outcome(self) -> Outcome:
+        """Verdict on the requirements; ``undecided`` if cases are missing."""
+        words: dict[str, Outcome] = {"passed": "met", "failed": "missed", "done": "not shown"}
+        return words.get(self.status, "undecided")
+
+    @property
     def warnings(self) -> list[str]:
         """Warnings of the runs, cases without a result, and missing cases."""
         return list(self._warnings)
@@ -515,6 +531,7 @@ class StudyRun(Answer):
     def _warnings(self) -> list[str]:
         """The warnings, cached because computing them takes a pass over all cases."""
         texts = [*self.nominal.bench.outdated, *warned(self.findings, self.nominal.warnings)]
+        texts += filter(None, [self.check.warning if self.check else ""])
         if self.status == "unfinished":
             resume = StudyStore(self.folder).resume_command
             texts.append(unfinished(self.plan, self.findings.count, resume))
@@ -523,7 +540,8 @@ class StudyRun(Answer):
     @property
     def notes(self) -> list[str]:
         """Notes on rounding and repair, and on the meaning of intervals."""
-        return noted(self.findings, self.damaged)
+        checked = [self.check.note] if self.check and self.check.note else []
+        return [*noted(self.findings, self.damaged), *checked]
 
     def worst(self, kpi: str) -> Bench:
         """Return the bench of the worst case for a requirement.
@@ -654,9 +672,21 @@ class StudyRun(Answer):
             "folder": str(self.folder),
             "bench": tested_data(self.plan.bench, self.plan.tested),
             **findings_data(self.findings),
+            **choice_data(self.plan.bench),
+            **({} if self.check is None else {"error_check": _check_data(self.check)}),
             "warnings": self.warnings,
             "notes": self.notes,
         }
+
+
+def _check_data(check: ErrorCheck) -> dict[str, Any]:
+    return {
+        "cases": check.cases,
+        "kpis": {
+            name: {"largest": largest, "exceeding": check.exceeding.get(name, 0)}
+            for name, largest in check.largest.items()
+        },
+    }
 
 
 # --- Studies computed, or read from their folders
@@ -723,6 +753,7 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
         raise error.reworded(
             f"{error}. This study needs {' '.join(map(_loaded_by, unloaded))}"
         ) from None
+    plan = with_step(plan, store)
     is_listed = plan.design in SPANNED
     return (plan if is_listed else replace(plan, cases=int(record["cases"]))), origin
 
@@ -748,7 +779,8 @@ def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
         is_whole = findings.count == plan.total
     judged = status_of(findings.judgments) if findings.spreads else "failed"
     status = judged if is_whole else "unfinished"
-    return StudyRun(plan, store.folder, findings, nominal, status)
+    check = error_check(findings, nominal)
+    return StudyRun(plan, store.folder, findings, nominal, status, check=check)
 
 
 def _loaded_by(path: str) -> str:

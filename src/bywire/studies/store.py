@@ -16,7 +16,7 @@ import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, key_figures_of
+from bywire.bench.joined import in_groups
 from bywire.cases.store import PieceFolder
 from bywire.core.arguments import whole_number
 from bywire.core.brake import loaded_files
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
 
 CASE, FAILURE, WARNINGS = "case", "failure", "warnings"
 """other columns than values and key figures: number, reason for a missing result, warnings"""
+
+CHOICE = "choice"
+"""entry of the record: the step that bywire chose for a stated error"""
 
 Columns = dict[str, NDArray[Any]]
 
@@ -137,22 +141,29 @@ def _computed(
     values: Mapping[str, NDArray[Any]],
     threads: int | None,
 ) -> Columns:
-    count = len(numbers)
-    benches: dict[int, Bench] = {}
-    failures = [""] * count
-    rows = zip(*(column.tolist() for column in values.values()), strict=True)
-    for k, (number, row) in enumerate(zip(numbers.tolist(), rows, strict=True)):
-        try:
-            benches[k] = case_bench(plan, number, dict(zip(values, row, strict=True)))
-        except BywireError as error:
-            failures[k] = str(error)
+    count, own = len(numbers), numbers.tolist()
+    rows = list(zip(*(column.tolist() for column in values.values()), strict=True))
+
+    def bench(k: int) -> Bench:
+        return case_bench(plan, own[k], dict(zip(values, rows[k], strict=True)))
+
     names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
     columns: Columns = {CASE: numbers, **values}
     columns |= {name: np.full(count, math.nan) for name in names}
     columns |= {name: np.full(count, "", dtype=object) for name in (FAILURE, WARNINGS)}
-    columns[FAILURE][:] = failures
-    for group in _alike(benches):
-        _fill(columns, group, benches, threads)
+    seeds = [_seed(plan, number) for number in own]
+    for places, joined in in_groups(plan.bench, values, seeds, bench):
+        if joined is not None:
+            _fill(columns, places.tolist(), joined, threads)
+            continue
+        benches: dict[int, Bench] = {}
+        for k in places.tolist():
+            try:
+                benches[k] = bench(k)
+            except BywireError as error:
+                columns[FAILURE][k] = str(error)
+        for group in _alike(benches):
+            _fill(columns, group, [benches[k] for k in group], threads)
     return columns
 
 
@@ -164,15 +175,14 @@ def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench
     InputError
         If the values contradict each other, or the experiment does not run with them.
     """
-    seed = plan.bench.seed + number if _is_noisy(plan, number) else None
-    return changed(plan.bench, values, seed)
+    return changed(plan.bench, values, _seed(plan, number))
 
 
-def _is_noisy(plan: StudyPlan, number: int) -> bool:
-    """Return whether a case has its own noise."""
-    if plan.sought is not None:
-        return plan.sought.has_own_noise(number // CHUNK)
-    return plan.is_sampled
+def _seed(plan: StudyPlan, number: int) -> int:
+    """Return the seed of a case, which differs if the case has its own noise."""
+    sought = plan.sought
+    is_noisy = plan.is_sampled if sought is None else sought.has_own_noise(number // CHUNK)
+    return plan.bench.seed + number if is_noisy else plan.bench.seed
 
 
 def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
@@ -185,11 +195,11 @@ def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
 
 
 def _fill(
-    columns: Columns, cases: Sequence[int], benches: Mapping[int, Bench], threads: int | None
+    columns: Columns, cases: Sequence[int], benches: Sequence[Bench], threads: int | None
 ) -> None:
     """Store results in the rows of their cases; if they fail together, rerun them separately."""
     try:
-        given = key_figures_of([benches[k] for k in cases], threads)
+        given = key_figures_of(benches, threads)
     except DeviceError:  # not caused by a case
         raise
     except BywireError as error:
@@ -197,8 +207,8 @@ def _fill(
             columns[FAILURE][cases[0]] = str(error)
             return
         middle = len(cases) // 2
-        _fill(columns, cases[:middle], benches, threads)
-        _fill(columns, cases[middle:], benches, threads)
+        _fill(columns, cases[:middle], benches[:middle], threads)
+        _fill(columns, cases[middle:], benches[middle:], threads)
         return
     for figure in given.figures:
         columns[figure.name][cases] = figure.values
@@ -369,6 +379,8 @@ class StudyStore(PieceFolder):
             "set": dict(origin.overrides),
             "systems": list(loaded_files()),
         }
+        if plan.bench.choice is not None:
+            about[CHOICE] = asdict(plan.bench.choice)
         self.begin(plan, about)
         self._units.update(plan.column_units)
 
