@@ -363,7 +363,7 @@ class Rows:
     def outline(self, name: str) -> Array | None:
         """Return first, lowest, highest and last values of a signal in each run, shape (runs, 4).
 
-        None for rows that are no graphics processor's, or that are not finite.
+        None for rows that no graphics processor holds, and for rows that are not finite.
         """
         values = None if self.held is None else self.held.extremes(name)
         return None if values is None or not np.isfinite(values).all() else values
@@ -371,7 +371,7 @@ class Rows:
     def outlined(self) -> Rows | None:
         """Return rows with the first, lowest, highest and last value of each signal.
 
-        None for rows that are no graphics processor's.
+        None for rows that no graphics processor holds.
         """
         if self.held is None:
             return None
