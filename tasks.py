@@ -74,6 +74,7 @@ NEWEST_TESTS = [
         "simulation/test_run_outcomes.py",
         "analysis/test_margins.py",
         "life/test_life_file.py",
+        "procedures/test_formula.py",
         "plant/test_adhesion.py",
         "vehicle",
         "reproduction/test_item.py",

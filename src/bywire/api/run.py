@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bywire.api.run_sections import (
+    choice_data,
     energy,
     how_it_was_made,
     outcome,
@@ -24,6 +25,7 @@ from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
+from bywire.bench.step_choice import with_chosen_step
 from bywire.core.arguments import require_kinds
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Progress
@@ -79,7 +81,7 @@ def require_scene(bench: Bench, over: str = "") -> None:
 def _playable(result: Result) -> list[str]:
     """Return the labels of runs that an animation can show."""
     place = SCENES.find(result.bench.definition.assembly).place
-    return [label for label, run in result.recordings.items() if place in run]
+    return [label for label, run in result.recorded.items() if place in run]
 
 
 def animations(result: Result) -> list[Attachment]:
@@ -213,7 +215,7 @@ class BenchResult(Result, Answer):
     def ledgers(self) -> dict[str, Ledger]:
         """Return the energy balances of every run from time zero on, by label."""
         ledgers = {}
-        for label, recording in self.recordings.items():
+        for label, recording in self.recorded.items():
             if "E_stored" not in recording or recording["E_stored"].dims != ("time",):
                 continue
             after = recording.sel(time=slice(-1e-9, None))
@@ -253,7 +255,7 @@ class BenchResult(Result, Answer):
             banner=self._banner(),
             attachments=[
                 recording_file(f"{label}.nc", recording)
-                for label, recording in self.recordings.items()
+                for label, recording in self.recorded.items()
             ]
             + self._animations(),
             record="result.json",
@@ -308,7 +310,7 @@ class BenchResult(Result, Answer):
                 for name, signal in recording.items()
                 if "step_error_rms" in signal.attrs
             }
-            for label, recording in self.recordings.items()
+            for label, recording in self.recorded.items()
         }
 
     def _banner(self) -> Banner:
@@ -343,6 +345,7 @@ class BenchResult(Result, Answer):
                 for label, books in self.ledgers().items()
             },
             "step_errors": self._step_errors(),
+            **choice_data(self.bench),
             "warnings": self.warnings,
         }
 
@@ -351,6 +354,7 @@ def run_once(
     bench: Bench, progress: Progress | None, engine: str, estimate_error: bool, animated: bool
 ) -> BenchResult:
     """Return the result of a bench (see `bywire.run`)."""
+    bench = with_chosen_step(bench, progress=progress)
     result = running.run(bench, progress, engine, estimate_error)
     return BenchResult(
         **{each.name: getattr(result, each.name) for each in fields(result)}, animated=animated
@@ -367,7 +371,7 @@ def bench_of(bench: Bench | str | Path, overrides: Mapping[str, str]) -> Bench:
     """
     if not isinstance(bench, Bench):
         return bench_file.read(bench, overrides)
-    return bench.with_overrides(overrides) if overrides else bench
+    return bench.with_overrides(overrides).without_choice() if overrides else bench
 
 
 def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
@@ -380,7 +384,7 @@ def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
     """
     if not faults:
         return bench
-    return replace(bench, faults=(*bench.faults, *map(from_text, faults)))
+    return replace(bench.without_choice(), faults=(*bench.faults, *map(from_text, faults)))
 
 
 def _remark(verdict: Verdict) -> str:

@@ -373,8 +373,8 @@ class CudaDevice:
         code, why = int(status), f"({status.name})"
         if code == _IN_USE:
             text = (
-                f"{self.label} is in use by another process, and its compute mode allows no "
-                f"other one {why}. End that process, which nvidia-smi lists, select another "
+                f"{self.label} is in use by another process, and its compute mode does not allow "
+                f"another one {why}. End that process, which nvidia-smi lists, select another "
                 f"graphics processor with {VARIABLE}, or have an administrator type 'nvidia-smi "
                 f"-c DEFAULT', {OTHERWISE}"
             )

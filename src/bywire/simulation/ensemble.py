@@ -34,17 +34,19 @@ from bywire.simulation.advance import (
 from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
 from bywire.simulation.engine import CUDA, are_alike, prepare
 from bywire.simulation.native import Ends, Inputs
+from bywire.simulation.noise import Noise, put_noises
 from bywire.simulation.run import (
     Run,
     Trajectory,
     initial_vector,
     initial_vectors,
-    put_into,
+    put_signals,
     sampled_stimulus,
     selected,
     simulate,
     stimulus_ranges,
 )
+from bywire.simulation.run_table import RunTable, change, one_of
 from bywire.simulation.schedule import COUNTERS, Schedule
 
 if TYPE_CHECKING:
@@ -67,6 +69,8 @@ def fit_lanes(runs: Sequence[Run], engine: str = "auto") -> bool:
     """
     if not is_side_by_side(engine) or not runs:
         return False
+    if isinstance(runs, RunTable):
+        return True
     first, schedule = runs[0], runs[0].schedule()
     return all(
         are_alike(each.model, each.par, first.model, first.par) and each.schedule() == schedule
@@ -100,7 +104,7 @@ class RunGroup(Sequence[Trajectory]):
         their names.
     """
 
-    runs: tuple[Run, ...]
+    runs: Sequence[Run]
     time: Array
     values: Array | HeldRows
     names: tuple[str, ...]
@@ -223,20 +227,21 @@ def simulate_group(
             "model, structure, duration, step, recording interval and sample times",
             name="runs",
         )
-    prepared = prepare(runs[0].model, runs[0].par)
+    one = one_of(runs)
+    prepared = prepare(one.model, one.par)
     names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
-    if ends and any(run.changes for run in runs):
+    if ends and change(runs):
         raise ParameterError(
             "ends is not available for runs with changes, which record all rows. Omit ends",
             name="ends",
         )
     selection = tuple(selected(names, (*wanted, *ends)).tolist())
-    schedule = runs[0].schedule()
+    schedule = one.schedule()
     kernel = case_kernel(prepared, engine, selection, len(runs), schedule, len(ends))
     edges = _edges(schedule, first, runs, _CUDA_SUBSTEPS if engine == CUDA else _SUBSTEPS)
-    output = runs[0].model.Output
-    jumping = energies(output, wanted) if any(run.changes for run in runs) else np.empty((0, 0))
+    output = one.model.Output
+    jumping = energies(output, wanted) if change(runs) else np.empty((0, 0))
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
     recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
     shape = len(recorded), len(runs), schedule.rows - first
@@ -247,9 +252,11 @@ def simulate_group(
     at_ends = np.zeros((len(ends), len(runs), 2))
     frames = (first * schedule.record_frames, (schedule.rows - 1) * schedule.record_frames)
 
+    room = _Room()
+
     def computed(begin: int) -> Array:
         cases = slice(begin, begin + kernel.lanes)
-        carried = _Carried(kernel, schedule, runs[cases], jumping)
+        carried = _Carried(kernel, schedule, runs[cases], jumping, room)
         apart = Ends(at_ends[:, cases], frames) if ends else None
         part = values[:, cases] if isinstance(values, np.ndarray) else values
         return carried.to_the_end(part, edges, first, watch, apart)
@@ -258,7 +265,7 @@ def simulate_group(
         vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
     vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
     return RunGroup(
-        tuple(runs),
+        runs if isinstance(runs, RunTable) else tuple(runs),
         schedule.record_times[first:],
         values,
         recorded,
@@ -278,7 +285,8 @@ def _edges(schedule: Schedule, first: int, runs: Sequence[Run], least: int) -> l
     every = schedule.record_frames
     count = min(_CHUNKS, schedule.frames * schedule.substeps // least + 1)
     rows = {*np.linspace(0, schedule.frames // every, count + 1).astype(int).tolist(), first}
-    changed = (pieces(run.par, run.changes, schedule) for run in runs if run.changes)
+    several = runs if change(runs) else ()
+    changed = (pieces(run.par, run.changes, schedule) for run in several if run.changes)
     begins = {begin for stretches in changed for begin, _, _ in stretches}
     return sorted(begins.union(each * every for each in rows))
 
@@ -297,13 +305,37 @@ class _Watch:
                 self._progress(self._done / self._pieces)
 
 
+class _Room(threading.local):
+    """Memory of a thread for the stimuli of one group of lanes after the other."""
+
+    rows: Array | None = None
+
+
+def _shared_stimuli(group: RunTable, kernel: CaseKernel, room: _Room) -> Array | Inputs:
+    """Return stimulus rows as in `_stimuli`; for lanes, they are valid until the next group."""
+    count, width, own = len(group), kernel.lanes, np.array(group.noisy, dtype=int)
+    if kernel.shares_stimuli:
+        inputs = Inputs.of(lambda _: np.ascontiguousarray(group.stimulus.T), 1, width)
+        noise = _noise_rows(group.seeds, group.noisy, width, len(group.stimulus))
+        return inputs.with_noise(noise)
+    if not own.size:
+        return group.stimulus
+    if room.rows is None:
+        room.rows = np.repeat(group.stimulus[:, :, None], width, axis=2)
+    rows = room.rows
+    put_noises(rows.transpose(2, 0, 1)[:count], group.seeds, group.noisy)
+    if count < width:
+        rows[:, own, count:] = rows[:, own, count - 1 : count]
+    return rows
+
+
 def _stimuli(group: Sequence[Run], schedule: Schedule, kernel: CaseKernel) -> Array | Inputs:
     """Return the runs' stimulus rows as a kernel reads them.
 
     For lanes, the shape is (rows, nu, lanes), or (rows, nu) if all are equal.
     """
     t, ranges = schedule.stimulus_times, stimulus_ranges(group[0].model)
-    shape, width = (len(group[0].model.Stimulus._fields), t.size), kernel.lanes
+    shape, width, count = (len(group[0].model.Stimulus._fields), t.size), kernel.lanes, len(group)
 
     def require_usual(signals: Array, runs: Sequence[Run]) -> None:
         is_usual = np.isfinite(signals).all() and all(
@@ -314,21 +346,51 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, kernel: CaseKernel) -> Ar
             for run in runs:
                 sampled_stimulus(run, schedule)  # raises an error with the signal and the time
 
+    noises: dict[int, Noise] = {}
+
+    def put(signals: Array, case: int) -> None:
+        noise = put_signals(signals.T, group[case], t)
+        if noise is not None:
+            noises[case] = noise
+
     def rows_of(case: int) -> Array:
         signals = np.zeros(shape)
-        put_into(signals.T, group[case], t)
+        put(signals, case)
         require_usual(signals[None], group[case : case + 1])
         return signals
 
     if kernel.shares_stimuli:
-        return Inputs.of(rows_of, len(group), width)
+        inputs = Inputs.of(rows_of, count, width)
+        noise = _noise_rows(*_seeds_of(noises), width, t.size) if noises else {}
+        return inputs.with_noise(noise)
     signals = np.zeros((width, *shape))  # each contiguous
-    for lane, run in enumerate(group):
-        put_into(signals[lane].T, run, t)
-    signals[len(group) :] = signals[len(group) - 1]
+    for lane in range(count):
+        put(signals[lane], lane)
+    signals[count:] = signals[count - 1]
     require_usual(signals, group)
+    if noises:
+        rows = signals.transpose(2, 1, 0).copy()
+        put_noises(rows.transpose(2, 0, 1)[:count], *_seeds_of(noises))
+        rows[:, :, count:] = rows[:, :, count - 1 : count]
+        return rows
     is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
     return (signals[0].T if is_shared else signals.transpose(2, 1, 0)).copy()
+
+
+def _seeds_of(noises: Mapping[int, Noise]) -> tuple[NDArray[np.uint64], tuple[int, ...]]:
+    """Return the seeds of runs of one model, shape (runs, numbers), and their noisy columns."""
+    each = [noises[k] for k in range(len(noises))]
+    return np.array([noise.seed for noise in each], dtype=np.uint64), each[0].columns
+
+
+def _noise_rows(
+    seeds: NDArray[np.uint64], columns: tuple[int, ...], width: int, samples: int
+) -> dict[int, Array]:
+    """Return the noise of all cases by column, shape (width, samples); idle ones repeat a case."""
+    rows, count = np.empty((len(columns), width, samples)), len(seeds)
+    put_noises(rows.transpose(1, 2, 0)[:count], seeds, range(len(columns)))
+    rows[:, count:] = rows[:, count - 1 : count]
+    return dict(zip(columns, rows, strict=True))
 
 
 class _Carried:
@@ -338,16 +400,29 @@ class _Carried:
     """
 
     def __init__(
-        self, kernel: CaseKernel, schedule: Schedule, group: Sequence[Run], jumping: Array
+        self,
+        kernel: CaseKernel,
+        schedule: Schedule,
+        group: Sequence[Run],
+        jumping: Array,
+        room: _Room,
     ) -> None:
         self._kernel, self._schedule, self._jumping = kernel, schedule, jumping
         self._books = len(jumping) if jumping.any() else 0
         self._count, width = len(group), kernel.lanes
+        self._changes: dict[int, list[tuple[int, ParameterSet]]] = {}
+        if isinstance(group, RunTable):
+            lanes = np.minimum(np.arange(width), self._count - 1)  # idle lanes repeat the last run
+            vector = initial_vectors(kernel.layout, group.states[lanes], group.memories[lanes])
+            self._vector = vector.T.copy()
+            self._parameters = group.parameters[lanes].T.copy()
+            self._stimulus = _shared_stimuli(group, kernel, room)
+            self._most = np.full(width, group.like.most_work)
+            return
         filled = [*group, *[group[-1]] * (width - len(group))]  # idle lanes repeat the last run
         states, memories = [run.state for run in filled], [run.memory for run in filled]
         self._vector = initial_vectors(kernel.layout, states, memories).T.copy()
         self._parameters = leaf_table([run.par for run in filled]).T.copy()
-        self._changes: dict[int, list[tuple[int, ParameterSet]]] = {}
         for lane, run in enumerate(filled):
             for begin, _, par in pieces(run.par, run.changes, schedule) if run.changes else ():
                 self._changes.setdefault(begin, []).append((lane, par))

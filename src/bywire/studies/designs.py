@@ -13,9 +13,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from bywire.core.errors import ParameterError, not_valid
 from bywire.core.typing import Array
@@ -70,6 +68,8 @@ class Sampled:
         scores
             Shape (cases, quantities).
         """
+        from scipy import special
+
         return self._quantiles(np.clip(special.ndtr(self.correlated(scores)), *_INSIDE))
 
     def correlated(self, scores: Array) -> Array:
@@ -423,4 +423,8 @@ def library_version(kind: str) -> str:
     FileError
         If OpenTURNS is not installed.
     """
-    return str(scipy.__version__ if kind == WORST else library("openturns", *OPENTURNS).__version__)
+    if kind != WORST:
+        return str(library("openturns", *OPENTURNS).__version__)
+    import scipy
+
+    return str(scipy.__version__)

@@ -6,10 +6,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType, ModuleType
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases, Measure
 from bywire.bench.kpis.loop_family import FiguresInC, LoopFamily
@@ -18,6 +17,9 @@ from bywire.bench.recording import Rows
 from bywire.core.errors import CompilerError, ModelError
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -218,7 +220,7 @@ class FamilyJudge:
         each = [known[id(chosen)] for chosen in options]
         own: Iterable[KpiOfCases] = ()
         if self.levels is not None or self.further is not None:
-            runs = [cast(xr.Dataset, rows.case(k, par=par)) for k, par in enumerate(pars)]
+            runs = [cast("xr.Dataset", rows.case(k, par=par)) for k, par in enumerate(pars)]
             each = list(map(self._of_run, each, runs, options))
             if self.further is not None:
                 own = of_cases(list(map(self.further, runs, options)))
@@ -277,7 +279,7 @@ def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, 
         if together is not None:
             return together
     each = [
-        evaluate(name, cast(xr.Dataset, rows.case(k)), setting).values()
+        evaluate(name, cast("xr.Dataset", rows.case(k)), setting).values()
         for k, setting in enumerate(settings)
     ]
     return {figure.name: figure for figure in of_cases(each)}
@@ -303,7 +305,7 @@ def _in_c(family: LoopFamily, rows: Rows, settings: Sequence[Any]) -> dict[str, 
         return None
     on_device = _on_device(family, rows, settings)
     if on_device is None:
-        signals, level = family.signals_of(cast(xr.Dataset, rows), first)
+        signals, level = family.signals_of(cast("xr.Dataset", rows), first)
         made = family.in_c(rows["time"].values, list(signals.values()), settings)
     else:
         made, level = on_device

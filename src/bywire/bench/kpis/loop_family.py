@@ -28,7 +28,6 @@ from types import FunctionType, ModuleType, NoneType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi, Measure, Undefined
@@ -51,6 +50,9 @@ from bywire.simulation.cuda import THREADS
 
 if TYPE_CHECKING:
     from bywire.bench.recording import Held
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 NO_NUMBER = "its value is not a finite number"
 _NO_FIGURE = Undefined(NO_NUMBER)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.validity import outline
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 WATCHED = ("at_stop", "F_stop", "i", "p_pd")
 

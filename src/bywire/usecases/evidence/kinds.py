@@ -25,6 +25,7 @@ from bywire.core.typing import Progress
 from bywire.core.version import __version__
 from bywire.identification.replay_fit import read_tolerances
 from bywire.life.life_file import LifePlan
+from bywire.procedures.procedure_file import ProcedurePlan
 from bywire.report.bench_figures import FIGURES
 from bywire.signoff.plan import Computed, Task
 from bywire.synthesis.linear_case import read as read_loop_limits
@@ -185,6 +186,15 @@ def _life_limit(plan: LifePlan, text: str) -> Limit:
     return read_figure_limit(text, {name: unit for name, (unit, _) in LIFE_FIGURES.items()})
 
 
+def _read_procedure(asked: Asked) -> ProcedurePlan:
+    plan: ProcedurePlan = use_cases()["run_procedure"].read(asked)
+    return plan
+
+
+def _procedure_limit(plan: ProcedurePlan, text: str) -> Limit:
+    return read_figure_limit(text, plan.units)
+
+
 def _read_contracts(asked: Asked) -> str:
     name = str(asked["name"])
     next(demands_on(name, FIGURES.all()), None)  # rejects an unknown name
@@ -236,6 +246,14 @@ KINDS: Mapping[str, Kind] = {
     ),
     "life": Kind(
         "project_life", "source", _read_life, _life_identity, _life_limit, resolved=("set",)
+    ),
+    "procedure": Kind(
+        "run_procedure",
+        "procedure",
+        _read_procedure,
+        lambda plan: plan.identity,
+        _procedure_limit,
+        resolved=("set",),
     ),
     "contracts": Kind(
         "check", "name", _read_contracts, lambda name: {"of": name}, is_by_source=True
