@@ -14,6 +14,7 @@ from pathlib import Path
 from benchmarks.commands import environment
 from benchmarks.judging import CHUNKS, simulated_and_judged
 from benchmarks.result import Result, at_least, at_most
+from benchmarks.stated_error import of_stated_error
 from benchmarks.suite import Part
 from bywire.core.child_process import python_command
 from bywire.core.libraries import allow_dask
@@ -51,6 +52,7 @@ overshoot = "<= 15 % with 99 %"
 steady_state_error = "<= 0.1 bar"
 rise_time = "<= 100 ms with 95 %"
 """
+_STATED = ("0.1 %", "1 %")  # numerical errors that the bench of a study states
 _COMMANDS = 2  # number of commands, of which the faster one counts
 _CASES_AT = CHUNKS * CHUNK  # cases that are computed together
 _ROUNDS = 3
@@ -108,6 +110,10 @@ def studies() -> Iterator[Result]:
             f"creating, checking, judging and storing cases, {1e6 * beside:.3g} us per case, of "
             f"which storing {1e6 * stored:.3g} us, relative to the simulation",
         )
+        many = Path(folder) / "many.toml"
+        many.write_text(_MANY, encoding="utf-8")
+        for error in _STATED:
+            yield from of_stated_error(many, error, f"study.error_{error.split()[0]}")
         yield _command(Path(folder))
         if Path("/proc/self/status").exists():
             yield _memory(path, Path(folder) / "out")
