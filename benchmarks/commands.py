@@ -5,9 +5,10 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from benchmarks.result import Result, at_most, failed
 from bywire.core import child_process
@@ -61,16 +62,16 @@ def measured(commands: Sequence[Command]) -> Iterator[Result]:
 def _measured(command: Command, folder: Path) -> Result:
     line = _line(command.arguments, folder)
     if command.first:
-        _seconds(_line(command.first, folder))
-    _seconds(_UNIT)
+        seconds_of(_line(command.first, folder))
+    seconds_of(_UNIT)
     libraries, taken = [], []
     before = _kernels()
     for _ in range(command.rounds):
-        libraries.append(_seconds(_UNIT))
-        taken.append(_seconds(line))
+        libraries.append(seconds_of(_UNIT))
+        taken.append(seconds_of(line))
     if len(taken) == 1 and _kernels() != before:  # it compiled
-        taken.append(_seconds(line))
-    libraries.append(_seconds(_UNIT))
+        taken.append(seconds_of(line))
+    libraries.append(seconds_of(_UNIT))
     least, unit = min(taken), min(libraries)
     note = f"{' '.join(command.arguments)}: {least:.3g} s; L = {unit:.3g} s; "
     note += f"minimum of {len(taken)} in turn" if len(taken) > 1 else "run once"
@@ -86,22 +87,38 @@ def _kernels() -> set[str]:
     return {path.name for path in usable_folder().glob("*.so")}
 
 
-def _seconds(line: Sequence[str]) -> float:
-    """Return the run time of a process, without showing its output.
+def seconds_of(
+    line: Sequence[str],
+    limit: float | None = None,
+    changes: Mapping[str, str] = MappingProxyType({}),
+) -> float:
+    """Return the run time of a process [s], without showing its output.
+
+    Parameters
+    ----------
+    line
+        Command line of a command of bywire, or of another program.
+    limit
+        Maximum run time [s]. Default: none.
+    changes
+        Additional environment variables.
 
     Raises
     ------
     CalledProcessError
         If the process fails.
+    TimeoutExpired
+        If the process is not finished within its limit. It is killed.
     """
     begin = time.perf_counter()
     done = subprocess.run(
         line,
-        env=environment(),
+        env=environment() | dict(changes),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         encoding="utf-8",
         errors="replace",
+        timeout=limit,
         check=False,
     )
     seconds = time.perf_counter() - begin

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
-import xarray as xr
 
 from bywire.api.run import bench_of
 from bywire.bench import running
@@ -54,6 +53,7 @@ from bywire.report.terminal import change_texts
 from bywire.report.wording import amount, beside_limit, clean, measured_amount
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
     from bywire.report.step_response import StepLimits

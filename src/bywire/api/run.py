@@ -81,7 +81,7 @@ def require_scene(bench: Bench, over: str = "") -> None:
 def _playable(result: Result) -> list[str]:
     """Return the labels of runs that an animation can show."""
     place = SCENES.find(result.bench.definition.assembly).place
-    return [label for label, run in result.recordings.items() if place in run]
+    return [label for label, run in result.recorded.items() if place in run]
 
 
 def animations(result: Result) -> list[Attachment]:
@@ -215,7 +215,7 @@ class BenchResult(Result, Answer):
     def ledgers(self) -> dict[str, Ledger]:
         """Return the energy balances of every run from time zero on, by label."""
         ledgers = {}
-        for label, recording in self.recordings.items():
+        for label, recording in self.recorded.items():
             if "E_stored" not in recording or recording["E_stored"].dims != ("time",):
                 continue
             after = recording.sel(time=slice(-1e-9, None))
@@ -255,7 +255,7 @@ class BenchResult(Result, Answer):
             banner=self._banner(),
             attachments=[
                 recording_file(f"{label}.nc", recording)
-                for label, recording in self.recordings.items()
+                for label, recording in self.recorded.items()
             ]
             + self._animations(),
             record="result.json",
@@ -310,7 +310,7 @@ class BenchResult(Result, Answer):
                 for name, signal in recording.items()
                 if "step_error_rms" in signal.attrs
             }
-            for label, recording in self.recordings.items()
+            for label, recording in self.recorded.items()
         }
 
     def _banner(self) -> Banner:

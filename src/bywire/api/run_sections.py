@@ -50,7 +50,7 @@ def remarks(result: Result) -> list[str]:
     tenth, or misses its set point by more than a twentieth of the step. Faults and the model's own
     remarks are included.
     """
-    faults = fault_texts(result.bench, result.recordings)
+    faults = fault_texts(result.bench, result.recorded)
     return [
         *choice_texts(result.bench),
         *faults,
@@ -117,7 +117,7 @@ def _of_models(result: Result) -> list[str]:
     """
     texts: dict[str, None] = {}
     models = ASSEMBLIES.beside(type(result.bench.par))
-    for recording in result.recordings.values():
+    for recording in result.recorded.values():
         model = models.get(str(recording.attrs.get("model")))
         text = recording.attrs.get("parameters")
         if model is None or text is None or not recording.sizes.get("time"):
@@ -188,7 +188,7 @@ def source_says(result: Result) -> list[Block]:
         return []
     units = {
         name: str(signal.attrs.get("units", "1"))
-        for recording in result.recordings.values()
+        for recording in result.recorded.values()
         for name, signal in recording.data_vars.items()
     }
     rows = [
@@ -225,7 +225,7 @@ def how_it_was_made(
     ``errors`` are the numerical errors of all recorded signals, by run and name.
     """
     bench, cited = result.bench, PARAMETER_SETS.find(result.bench.parameters)
-    attrs = next(iter(result.recordings.values())).attrs if result.recordings else {}
+    attrs = next(iter(result.recorded.values())).attrs if result.recorded else {}
     kept = "; ".join(f"{key} {attrs[key]}" for key in _RECORDED if key in attrs)
     parameters = parameter_table(parameter_rows(bench.par, cited.values))
     return Section(
@@ -285,7 +285,7 @@ def tested_line(plan: StudyPlan) -> str:
 def tested_brief(nominal: Result, plan: StudyPlan) -> list[Block]:
     """Return faults and varied quantities for a terminal."""
     names = ", ".join(each.name for each in plan.varied)
-    faults = [*choice_texts(nominal.bench), *fault_texts(nominal.bench, nominal.recordings)]
+    faults = [*choice_texts(nominal.bench), *fault_texts(nominal.bench, nominal.recorded)]
     listed = Listing([*faults, *([f"varied: {names}"] if names else [])])
     return [listed, Details("", [Listing(varied_texts(plan.varied))])]
 
@@ -307,7 +307,7 @@ def tested_section(nominal: Result, source: StudiedBench | None, subject: Subjec
     subject
         The bench with its changes.
     """
-    faults = [*choice_texts(nominal.bench), *fault_texts(nominal.bench, nominal.recordings)]
+    faults = [*choice_texts(nominal.bench), *fault_texts(nominal.bench, nominal.recorded)]
     blocks: list[Block] = [Paragraph(f"{_source_text(source)}.")] if source is not None else []
     blocks += [Listing(faults)] if faults else []
     blocks += [subject.changes_block, _options_in_use(nominal.bench)]

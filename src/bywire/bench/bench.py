@@ -46,7 +46,9 @@ from bywire.core.errors import (
 )
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
+from bywire.core.several import DifferError
 from bywire.core.traced import Traced
+from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.core.values import parsed
 from bywire.simulation.engine import engine_names, structure_of
@@ -425,6 +427,31 @@ class Bench:
         following = self.definition.following
         if not options and (following is None or following(par) == self._following):
             known["chosen_options"] = self.chosen_options
+        known["_cases"] = made._made(self.definition.cases)
+        return made
+
+    def joined(self, columns: Mapping[str, Array]) -> Bench:
+        """Return this bench with the numbers of several cases, only to set up its runs.
+
+        Parameters
+        ----------
+        columns
+            Value of each changed parameter in each case [SI], shape (cases,), by dotted name.
+
+        Raises
+        ------
+        DifferError
+            When a case is invalid, or when the cases must be set up separately.
+        """
+        made = object.__new__(type(self))
+        known = made.__dict__
+        known |= self._shared
+        known["overrides"] = {**self.overrides, **columns}
+        known["par"] = par = self.par.with_columns(columns)
+        following = self.definition.following
+        if following is not None and following(par) != self._following:
+            raise DifferError("options depend on the parameters")
+        known["chosen_options"] = self.chosen_options
         known["_cases"] = made._made(self.definition.cases)
         return made
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import lru_cache
 from string import Formatter
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
@@ -27,42 +26,12 @@ from bywire.core.quantities import BY_SIZE, Unit, display_unit
 from bywire.core.registry import Kind, instances
 from bywire.core.units import convert, shown, unit_text
 from bywire.simulation.advance import Change
+from bywire.simulation.noise import Noise, put_noise
 from bywire.simulation.run import Run
 from bywire.simulation.schedule import longest_step, plan
 
-_WORD = 32  # bits
-_POOL = 4  # minimum number of words of a seed before those of its child
-
-
-def put_noise(samples: NDArray[np.float64], seed: Sequence[int], child: int) -> None:
-    """Fill samples with standard normal noise, shape (samples,).
-
-    The samples equal those of ``SeedSequence(seed, spawn_key=(child,))``. Passing the seed's words
-    directly takes a third of the time.
-
-    Parameters
-    ----------
-    seed
-        Integers >= 0.
-    child
-        Number of the generator among those of this seed, >= 0.
-    """
-    words = [word for number in seed for word in _words(number)]
-    words += [0] * (_POOL - len(words))
-    sequence = np.random.SeedSequence(np.array([*words, *_words(child)], dtype=np.uint32))
-    generator = np.random.Generator(np.random.PCG64(sequence))
-    if samples.flags.c_contiguous:
-        generator.standard_normal(out=samples)
-    else:
-        samples[:] = generator.standard_normal(samples.size)
-
-
-def _words(number: int) -> Iterator[int]:
-    """Yield the 32-bit words of an integer, lowest first; one word for zero."""
-    yield number & 0xFFFFFFFF
-    while number := number >> _WORD:
-        yield number & 0xFFFFFFFF
-
+if TYPE_CHECKING:
+    import xarray as xr
 
 # --- Summaries: one line on an experiment, with the values of its options
 
@@ -149,7 +118,7 @@ def _value_text(value: Any, symbol: str, unit: str) -> str:
 
 # --- Experiments
 
-Recordings = Mapping[str, xr.Dataset]
+Recordings = Mapping[str, "xr.Dataset"]
 _LENGTHENED = 100.0  # maximum settling until all sample times coincide, relative to the run
 
 
@@ -392,18 +361,23 @@ class _Driven:
     seed: tuple[int, ...]
 
     def __call__(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        rows = np.zeros((t.size, len(self.case.model.Stimulus._fields)))
+        rows, noise = np.zeros((t.size, len(self.case.model.Stimulus._fields))), self.noise
         self.put_into(rows, t)
+        for child, column in enumerate(noise.columns):
+            put_noise(rows[:, column], noise.seed, child)
         return rows
 
+    @property
+    def noise(self) -> Noise:
+        """Noise that `put_into` leaves out."""
+        fields = self.case.model.Stimulus._fields
+        return Noise(self.seed, tuple(k for k, n in enumerate(fields) if n.startswith("noise_")))
+
     def put_into(self, rows: NDArray[np.float64], t: NDArray[np.float64]) -> None:
-        """Write the stimulus into rows of zeros; see `bywire.simulation.run.put_into`."""
-        given, drawn = driven_at(self.case, t - self.case.settle), 0
+        """Write the stimulus without noise into rows of zeros; see `bywire.simulation.run`."""
+        given = driven_at(self.case, t - self.case.settle)
         for k, name in enumerate(self.case.model.Stimulus._fields):
-            if name.startswith("noise_"):
-                put_noise(rows[:, k], self.seed, drawn)
-                drawn += 1
-            elif name in given:
+            if name in given and not name.startswith("noise_"):
                 rows[:, k] = given[name]
 
 

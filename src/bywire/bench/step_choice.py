@@ -33,7 +33,7 @@ from bywire.core.callers import option
 from bywire.core.errors import BywireError, DeviceError, InputError, RunError, StepError
 from bywire.core.typing import Array, Progress
 from bywire.core.units import shown
-from bywire.simulation.run import doubts_of
+from bywire.simulation.run_table import doubts_of
 
 _PERCENT = 100.0
 _COUNTS = sorted(2**a * 5**b for a in range(1, 24) for b in range(10))

@@ -16,14 +16,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import RunError, StepError, WorkLimitError
 from bywire.core.typing import Array
 from bywire.simulation.run import Run
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 OTHER_STEPS = (0.5, 2.0)
 """ratios of other steps to the run's step, which show the order"""

@@ -176,14 +176,13 @@ def error_check(findings: Findings, nominal: Result) -> ErrorCheck | None:
     choice = plan.bench.choice
     if choice is None:
         return None
-    spread = spread_over(range(len(findings.cases)), _CHECKED)
-    rows = [k for k in spread if k not in findings.failures]
+    rows = [k for k in spread_over(range(findings.count), _CHECKED) if findings.has_result(k)]
     if not rows:
         return None
     names = plan.bench.limits or findings.units
     nominal_values = {kpi.name: kpi.value for kpi in nominal.kpis}
     here = Figures(
-        {n: np.array([nominal_values[n], *findings.figure(n)[rows]]) for n in names},
+        {n: np.array([nominal_values[n], *(findings.row(k)[n] for k in rows)]) for n in names},
         np.zeros(1 + len(rows), dtype=bool),
     )
     others: dict[float, Figures] = {}

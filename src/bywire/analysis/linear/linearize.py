@@ -10,7 +10,6 @@ from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from bywire.analysis.linear.corners import Jacobians, Linearization, linear_models, magnitudes
 from bywire.analysis.linear.linear_model import LinearModel
@@ -264,7 +263,11 @@ def _stiffness(
             )
         blocks.append(K)
         at += len(C)
-    return block_diag(*blocks) if blocks else np.zeros((0, 0))
+    if not blocks:
+        return np.zeros((0, 0))
+    from scipy.linalg import block_diag  # slow to load
+
+    return block_diag(*blocks)
 
 
 def closed_contacts(model: Model, par: ParameterSet, state: NamedTuple) -> list[int]:

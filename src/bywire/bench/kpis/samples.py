@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from math import isfinite
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.kpis.kpi import Undefined
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.quantities import readable_unit
 from bywire.core.typing import Array
 from bywire.core.units import shown
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Samples = list[float]
 """samples of a signal, or their times"""
