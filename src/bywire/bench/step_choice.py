@@ -388,7 +388,7 @@ class _Trials:
         """
         trial = self.at(step)
         errors = trial.errors
-        if trial.doubt or errors.reached > stated or _HALF * step < FINEST:
+        if trial.doubt or errors.reached > stated:
             return trial
         half = self.at(_HALF * step).errors
         if not half.each:
