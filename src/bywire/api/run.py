@@ -354,7 +354,7 @@ def run_once(
     bench: Bench, progress: Progress | None, engine: str, estimate_error: bool, animated: bool
 ) -> BenchResult:
     """Return the result of a bench (see `bywire.run`)."""
-    bench = with_chosen_step(bench, progress=progress)
+    bench = with_chosen_step(bench, progress=progress, engine=engine)
     result = running.run(bench, progress, engine, estimate_error)
     return BenchResult(
         **{each.name: getattr(result, each.name) for each in fields(result)}, animated=animated

@@ -245,7 +245,7 @@ def simulate_group(
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
     recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
     shape = len(recorded), len(runs), schedule.rows - first
-    held = kernel.hold(shape) if hold and not any(run.changes for run in runs) else None
+    held = kernel.hold(shape) if hold and not change(runs) else None
     values: Array | HeldRows = kernel.array(shape) if held is None else held
     if isinstance(values, np.ndarray):
         values[len(wanted) :] = 0.0  # sums up the work of changes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -113,9 +113,12 @@ def complete(
     require_workers(workers, cluster, plan.bench.engine)
     if plan.bench.engine == CUDA:
         workers = _workers_on_device(workers)  # fails here, before the folder is created
-    store.open(plan, origin)
+    claim: Callable[[], object] = partial(store.open, plan, origin)
+    if store.folder.exists() or plan.sought is not None:
+        claim()
+        claim = tuple
     try:
-        return _completed(plan, store, workers, cluster, progress, meanwhile, until)
+        return _completed(plan, store, workers, cluster, progress, (claim, meanwhile), until)
     except DeviceError as error:
         kept = f"Finished chunks are saved: type '{store.resume_command}' to continue"
         raise error.reworded(f"{error}. {kept}") from None
@@ -127,10 +130,14 @@ def _completed(
     workers: int | None,
     cluster: str,
     progress: Progress,
-    meanwhile: Callable[[], object],
+    meanwhile: Sequence[Callable[[], object]],
     until: float,
 ) -> Completed:
-    """Compute the bench itself and the missing chunks; see `complete`."""
+    """Compute the bench itself and the missing chunks; see `complete`.
+
+    ``meanwhile``: called before the first chunk is stored. For a new folder, the first function
+    claims it, which takes as long as several chunks because the identity covers all definitions.
+    """
     damaged = store.drop_damaged()
     itself = partial(running.run, plan.bench, estimate_error=True)
     if plan.sought is not None:
@@ -151,7 +158,8 @@ def _completed(
     with executor.opened(plan) as compute:
         nominal_run = compute.beside(itself)
         computed = compute(missing)
-        meanwhile()
+        for each in meanwhile:
+            each()
         for count, (chunk, columns) in enumerate(computed, 1):
             store.write(chunk, columns, plan.column_units)
             progress(label, (done + count) / plan.chunks)

@@ -188,13 +188,20 @@ def error_check(findings: Findings, nominal: Result) -> ErrorCheck | None:
     others: dict[float, Figures] = {}
     for factor, bench in _other_steps(plan.bench):
         finer = replace(plan, bench=bench)
-        cases = [case_bench(finer, findings.number(k), findings.values(k)) for k in rows]
+        cases = [_case(finer, findings, k) for k in rows]
         try:
             others[factor] = figures_of([bench, *cases])
         except RunError:
             continue
     errors = errors_of(plan.bench, here, others, scales_of(plan.bench, nominal.recordings))
     return ErrorCheck(choice.stated, {n: each[1:] for n, each in errors.each.items()}, len(rows))
+
+
+def _case(plan: StudyPlan, findings: Findings, row: int) -> Bench | None:
+    try:
+        return case_bench(plan, findings.number(row), findings.values(row))
+    except InputError:  # the step does not divide a sample time of this case
+        return None
 
 
 def _other_steps(bench: Bench) -> Iterator[tuple[float, Bench]]:

@@ -128,6 +128,7 @@ def test_german_excel_and_other_names_of_columns(tmp_path: Path) -> None:
         (b'id;text\nR1;"a\nb"c\n', FileError, "brake.csv", 3),
         (b"id;text\nR1;a;b\n", FileError, "brake.csv", 2),
         (b"id;text;ID\nR1;a;b\n", ParameterError, "column", 1),
+        (b"id;text" + b";" * 1000, FileError, "brake.csv", 1),
         (b"\nname;text\nR1;a\n", UnknownNameError, "column", 2),
         (b"id,titel\nR1,a\n", UnknownNameError, "column", 1),
         (b"id;text\nR1;a\n;b\n", ParameterError, "id", 3),

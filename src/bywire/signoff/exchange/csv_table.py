@@ -24,6 +24,7 @@ _NEWLINE = re.compile(r"\r\n|\n|\r")
 _SEP_LINE = re.compile(r"sep=(.)(?:\r\n|\n|\r)", re.IGNORECASE)  # of Excel
 _MARK = "\ufeff"
 _FORMULA = tuple("=+-@\uff1d\uff0b\uff0d\uff20")  # also in full width, as in Japanese spreadsheets
+_MOST = 1000  # columns
 _NAMES = ("id", "text", "source", "group", "assumes")
 
 
@@ -77,7 +78,7 @@ class CsvTable(RequirementsFile):
             )
         self._head, self._body = rows[0], rows[1:]
         self._titles = [cell.text.strip() for cell in self._head.cells]
-        self._require_titles()
+        self._columns = self._columns_by_title()
         for row in self._body:
             self._require_width(row)
 
@@ -94,34 +95,27 @@ class CsvTable(RequirementsFile):
     @cached_property
     def entries(self) -> Sequence[Entry]:
         """Rows that are not blank."""
-        columns = [
-            (k, title)
-            for k, title in enumerate(self._titles)
-            if title and title.casefold() not in RESULT_ATTRIBUTES
-        ]
+        columns = [each for each in self._columns.items() if each[0] not in RESULT_ATTRIBUTES]
         return [
-            Entry(
-                {title: row.cells[k].text for k, title in columns if k < len(row.cells)}, row.line
-            )
+            Entry({name: row.cells[k].text for name, k in columns if k < len(row.cells)}, row.line)
             for row in self._body
         ]
 
     def with_results(self, results: Mapping[int, Result]) -> bytes:
         """Return the table with results in columns of their own, the last ones if they are new."""
-        titles = [title.casefold() for title in self._titles]
-        edits = self._edits(self._head, {name: name for name in RESULT_ATTRIBUTES}, titles)
+        edits = self._edits(self._head, {name: name for name in RESULT_ATTRIBUTES})
         for k, row in enumerate(self._body):
             texts = results[k].by_attribute() if k in results else {}
             cells = {name: _harmless(texts.get(name, "")) for name in RESULT_ATTRIBUTES}
-            edits += self._edits(row, cells, titles)
+            edits += self._edits(row, cells)
         return spliced(self._text, edits).encode("utf-8", "replace")
 
-    def _edits(self, row: _Row, cells: Mapping[str, str], titles: Sequence[str]) -> list[Edit[str]]:
+    def _edits(self, row: _Row, cells: Mapping[str, str]) -> list[Edit[str]]:
         """Return the changes of a row, in which cells may be missing at the end."""
-        edits, added = [], [""] * max(0, len(titles) - len(row.cells))
+        edits, added = [], [""] * max(0, len(self._titles) - len(row.cells))
         for name, text in cells.items():
             written = self._written(text)
-            k = titles.index(name) if name in titles else None
+            k = self._columns.get(name)
             if k is None:
                 added.append(written)
             elif k < len(row.cells):
@@ -130,7 +124,7 @@ class CsvTable(RequirementsFile):
                 added[k - len(row.cells)] = written
         if added:
             # Beyond the titles, there are only empty cells.
-            end = row.cells[min(len(row.cells), len(titles)) - 1].end
+            end = row.cells[min(len(row.cells), len(self._titles)) - 1].end
             edits.append((end, end, "".join(self._separator + text for text in added)))
         return edits
 
@@ -198,17 +192,26 @@ class CsvTable(RequirementsFile):
             )
         return cell
 
-    def _require_titles(self) -> None:
-        known: set[str] = set()
-        for title in map(str.casefold, self.attributes):
-            if title in known:
+    def _columns_by_title(self) -> dict[str, int]:
+        """Return the number of each column that has a title."""
+        place, width = f"{self.file}, line {self.head_line}", len(self._titles)
+        if width > _MOST:
+            raise FileError(
+                f"{place}: the table has {width} columns, but bywire reads at most {_MOST}. Remove "
+                "some of them",
+                name=str(self.file),
+                value=str(width),
+                valid=f"at most {_MOST}",
+            )
+        columns: dict[str, int] = {}
+        for k, title in enumerate(map(str.casefold, self._titles)):
+            if title and columns.setdefault(title, k) != k:
                 raise ParameterError(
-                    f"{self.file}, line {self.head_line}: two columns are named {quoted(title)}. "
-                    "Rename one of them",
+                    f"{place}: two columns are named {quoted(title)}. Rename one of them",
                     name="column",
                     value=title,
                 )
-            known.add(title)
+        return columns
 
     def _require_width(self, row: _Row) -> None:
         width = len(self._titles)

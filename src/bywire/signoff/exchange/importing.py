@@ -140,11 +140,11 @@ class _Reader:
         self._only = {self._attribute(key, "[only]"): _values(key, only[key]) for key in only}
 
     def _chosen(self, field: str, name: str) -> tuple[str, ...]:
-        """Return the attributes of a field that the file has, the preferred one first."""
+        """Return the names of a field's attributes in the file, the preferred one first."""
         if name:
             return (self._attribute(name, f"[attributes] {field}"),)
         usual = self._content.candidates[field]
-        names = [self._known[each.casefold()] for each in usual if each.casefold() in self._known]
+        names = [name for each in usual if (name := each.casefold()) in self._known]
         if not names and field in ("id", "text"):
             missing = unknown_of_few(self._content.attribute, usual[0], self._known.values())
             raise missing.reworded(
@@ -156,13 +156,13 @@ class _Reader:
         return tuple(names)
 
     def _attribute(self, name: str, where: str) -> str:
-        known = self._known.get(name.casefold())
-        if known is None:
+        """Return a name in lower case, by which entries have their values."""
+        if name.casefold() not in self._known:
             error = unknown_of_few(
                 f"{self._content.attribute} in {where}", name, self._known.values()
             )
             raise error.reworded(f"{self._head}: {error}")
-        return known
+        return name.casefold()
 
     @property
     def _head(self) -> Place:
@@ -206,8 +206,9 @@ class _Reader:
 
     def _require(self, field: str, value: str) -> None:
         if not value:
+            name = self._known[self._names[field][0]]
             raise ParameterError(
-                f"{self._content.attribute} {self._names[field][0]!r} is empty. Each requirement "
+                f"{self._content.attribute} {name!r} is empty. Each requirement "
                 "needs an id and a text. If this entry is not a requirement, exclude it with "
                 "[only] in the sign-off file",
                 name=field,
@@ -217,11 +218,12 @@ class _Reader:
         for name in names:
             if name in entry.attachments:
                 line, what = entry.attachments[name]
+                attribute = self._known[name]
                 raise FileError(
-                    f"{Place(self._content.file, line)}: {name!r} contains a binary attachment "
-                    f"({what}), which bywire cannot read. Describe it in words, or export the file "
-                    "without it",
-                    name=name,
+                    f"{Place(self._content.file, line)}: {attribute!r} contains a binary "
+                    f"attachment ({what}), which bywire cannot read. Describe it in words, or "
+                    "export the file without it",
+                    name=attribute,
                     value=what,
                 )
             if text := entry.values.get(name, "").strip():

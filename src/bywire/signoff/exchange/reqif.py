@@ -31,6 +31,7 @@ from bywire.signoff.exchange.xml_tree import Element, parse_xml
 from bywire.signoff.xml_text import xml_text
 
 _CONTENT = ("CORE-CONTENT", "REQ-IF-CONTENT")
+_OF_OBJECTS = ("IDENTIFIER", "LONG-NAME", "DESC")
 _HEADING = "reqif.chaptername"
 _TYPE_OF_HEADINGS = "heading"
 _ARCHIVE = b"PK\x03\x04"
@@ -120,10 +121,15 @@ class ReqifFile(RequirementsFile):
         self._objects = self._ordered()
 
     @property
+    def head_line(self) -> int:
+        """Line of the types of objects."""
+        return (self._core.first("SPEC-TYPES") or self._core).line
+
+    @property
     def attributes(self) -> Sequence[str]:
         """Names of all attributes of objects."""
         names = [each.name for each in self._by_identifier.values()]
-        return list(dict.fromkeys([*names, "IDENTIFIER", "LONG-NAME", "DESC"]))
+        return list(dict.fromkeys([*names, *_OF_OBJECTS]))
 
     @cached_property
     def entries(self) -> Sequence[Entry]:
@@ -187,7 +193,7 @@ class ReqifFile(RequirementsFile):
 
     def _heading(self, element: Element) -> str:
         """Return the heading of an object in one line; empty if it is not a heading."""
-        values = {name.casefold(): text for name, text in self._values(element).items()}
+        values = self._values(element)
         names = (_HEADING, *(("reqif.text", "reqif.name") if self._is_heading(element) else ()))
         return " ".join(next((values[each] for each in names if values.get(each)), "").split())
 
@@ -197,20 +203,18 @@ class ReqifFile(RequirementsFile):
             for each in _attachments(value):
                 kind = each.attributes.get("type", "object")
                 text = f"{kind} {each.attributes.get('data', '')}".strip()
-                attachments.setdefault(self._name(value), (each.line, text))
+                attachments.setdefault(self._name(value).casefold(), (each.line, text))
         values = {
-            "IDENTIFIER": self._identifier(element),
-            **{name: element.attributes.get(name, "") for name in ("LONG-NAME", "DESC")},
+            **{name.casefold(): element.attributes.get(name, "") for name in _OF_OBJECTS},
             **self._values(element),
         }
-        has_heading = any(text and name.casefold() == _HEADING for name, text in values.items())
-        return Entry(values, element.line, group, has_heading, attachments)
+        return Entry(values, element.line, group, bool(values.get(_HEADING)), attachments)
 
     def _values(self, element: Element) -> dict[str, str]:
-        """Return the texts of an object by the names of their attributes."""
+        """Return the texts of an object by the names of their attributes in lower case."""
         values: dict[str, str] = {}
         for each in element.every("VALUES", "*"):
-            name = self._name(each)
+            name = self._name(each).casefold()
             if name not in RESULT_ATTRIBUTES and not values.get(name):
                 values[name] = self._value_text(each)
         return values
@@ -302,7 +306,9 @@ class ReqifFile(RequirementsFile):
             if pieces:
                 is_new = True
                 yield self._added(kind, "SPEC-ATTRIBUTES", pieces)
-        known_types = {self._identifier(each) for each in self._core.every("DATATYPES", "*")}
+        known_types = {
+            each.attributes.get("IDENTIFIER") for each in self._core.every("DATATYPES", "*")
+        }
         if is_new and _DATATYPE not in known_types:
             mark = self._core.tag.removesuffix(self._core.name)
             yield self._added(

@@ -63,7 +63,7 @@ class Entry:
     Parameters
     ----------
     values
-        Texts by the names of their attributes, without those of earlier results.
+        Texts by the names of their attributes in lower case, without earlier results.
     line
         Its line.
     group
@@ -71,7 +71,7 @@ class Entry:
     is_heading
         Whether it is a heading unless it also has the text of a requirement.
     attachments
-        Attributes whose text contains a binary attachment, with its line and description.
+        Line and description of a binary attachment, by the name of the attribute in lower case.
     """
 
     values: Mapping[str, str]
@@ -110,9 +110,9 @@ class RequirementsFile(ABC):
         """Names of all attributes."""
 
     @property
+    @abstractmethod
     def head_line(self) -> int:
-        """Line with the names of the attributes; 0 if they have no line."""
-        return 0
+        """Line from which the names of the attributes come."""
 
     @abstractmethod
     def with_results(self, results: Mapping[int, Result]) -> bytes:
