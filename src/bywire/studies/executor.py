@@ -387,13 +387,18 @@ def executor_of(
         return Cluster(cluster)
     at_once = together or chunks
     if engine == CUDA:
-        count = worker_count(workers, max(at_once // (1 if workers else _LEAST_TOGETHER), 1))
+        count = workers_on_device(workers, at_once)
         rounds = -(-at_once // (count * _TOGETHER))
         batch = -(-at_once // (count * rounds))
         return Pool(count, batch) if count > 1 else InProcess(batch)
     count = worker_count(workers, at_once)
     is_worth = workers is not None or chunks >= (_WORTH_COPIES if may_copy() else _WORTH)
     return Pool(count) if count > 1 and is_worth else InProcess()
+
+
+def workers_on_device(workers: int | None, chunks: int) -> int:
+    """Return the number of processes for a number of chunks on a graphics processor."""
+    return worker_count(workers, max(chunks if workers else chunks // _LEAST_TOGETHER, 1))
 
 
 def _fitting(plan: StudyPlan, together: int, workers: int) -> int:
