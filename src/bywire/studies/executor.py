@@ -402,11 +402,12 @@ def workers_on_device(workers: int | None, chunks: int) -> int:
 
 
 def _fitting(plan: StudyPlan, together: int, workers: int) -> int:
-    """Return the number of chunks per batch, few enough for this machine's memory."""
+    """Return the number of chunks per batch, split evenly if they exceed this machine's memory."""
     if together == 1:
         return 1
     size = 8 * CHUNK * numbers_per_case(plan.bench)
-    return max(min(together, int(_SHARE * machine_memory() / workers / size)), 1)
+    most = max(int(_SHARE * machine_memory() / workers / size), 1)
+    return -(-together // -(-together // most))
 
 
 def require_workers(workers: int | None, cluster: str, engine: str) -> None:
