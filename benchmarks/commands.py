@@ -61,16 +61,16 @@ def measured(commands: Sequence[Command]) -> Iterator[Result]:
 def _measured(command: Command, folder: Path) -> Result:
     line = _line(command.arguments, folder)
     if command.first:
-        _seconds(_line(command.first, folder))
-    _seconds(_UNIT)
+        seconds_of(_line(command.first, folder))
+    seconds_of(_UNIT)
     libraries, taken = [], []
     before = _kernels()
     for _ in range(command.rounds):
-        libraries.append(_seconds(_UNIT))
-        taken.append(_seconds(line))
+        libraries.append(seconds_of(_UNIT))
+        taken.append(seconds_of(line))
     if len(taken) == 1 and _kernels() != before:  # it compiled
-        taken.append(_seconds(line))
-    libraries.append(_seconds(_UNIT))
+        taken.append(seconds_of(line))
+    libraries.append(seconds_of(_UNIT))
     least, unit = min(taken), min(libraries)
     note = f"{' '.join(command.arguments)}: {least:.3g} s; L = {unit:.3g} s; "
     note += f"minimum of {len(taken)} in turn" if len(taken) > 1 else "run once"
@@ -86,13 +86,22 @@ def _kernels() -> set[str]:
     return {path.name for path in usable_folder().glob("*.so")}
 
 
-def _seconds(line: Sequence[str]) -> float:
-    """Return the run time of a process, without showing its output.
+def seconds_of(line: Sequence[str], limit: float | None = None) -> float:
+    """Return the run time of a process [s], without showing its output.
+
+    Parameters
+    ----------
+    line
+        Command line of a command of bywire, or of another program.
+    limit
+        Maximum run time [s]. Default: none.
 
     Raises
     ------
     CalledProcessError
         If the process fails.
+    TimeoutExpired
+        If the process is not finished within its limit. It is killed.
     """
     begin = time.perf_counter()
     done = subprocess.run(
@@ -102,6 +111,7 @@ def _seconds(line: Sequence[str]) -> float:
         stderr=subprocess.PIPE,
         encoding="utf-8",
         errors="replace",
+        timeout=limit,
         check=False,
     )
     seconds = time.perf_counter() - begin

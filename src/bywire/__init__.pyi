@@ -12,6 +12,7 @@ from bywire.api.identification import Identification as Identification
 from bywire.api.life import LifeResult as LifeResult
 from bywire.api.new import NewBrake as NewBrake
 from bywire.api.overview import overview as overview
+from bywire.api.procedure import ProcedureResult as ProcedureResult
 from bywire.api.replay import Replay as Replay
 from bywire.api.run import BenchResult as BenchResult
 from bywire.api.run_over import BenchRange as BenchRange
@@ -56,6 +57,7 @@ from bywire.usecases.loops import frequency_response as frequency_response
 from bywire.usecases.loops import linearize as linearize
 from bywire.usecases.loops import margins as margins
 from bywire.usecases.new import new as new
+from bywire.usecases.procedure import run_procedure as run_procedure
 from bywire.usecases.project_life import project_life as project_life
 from bywire.usecases.replay import replay as replay
 from bywire.usecases.reproduce import reproduce as reproduce

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from typing import cast
+
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.catalog import parameters
 from bywire.simulation.branches import Arm, branch, branched
+from bywire.simulation.emit_lanes import emit_lanes
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph
+from bywire.simulation.program import build_program
+from bywire.simulation.stages import build_stages
 
 
 def selection() -> tuple[Graph, dict[str, int]]:
@@ -76,3 +85,11 @@ def test_text_assigns_in_both_arms() -> None:
     ]
     assert lines.index("  kept_v7 = v7;") < lines.index("} else {")
     assert lines.index("  const double v8 = kept_v8;") > lines.index("} else {")
+
+
+def test_lanes_compute_a_costly_arm_only_if_a_lane_selects_it() -> None:
+    par = cast(WedgeParameters, parameters("roberts2003"))
+    text = emit_lanes(build_stages(build_program(WedgeBrake(), par), outputs=(0,)))
+    powers = re.findall(r"(\S.*)\n\s+const V v\d+ = MAX\(.*\n\s+const V v\d+ = POW\(", text)
+    assert len(powers) == 2  # one friction curve for each motor
+    assert all(re.fullmatch(r"if \(ANY\(if_v\d+\)\) \{", line) for line in powers)

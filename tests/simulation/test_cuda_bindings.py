@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from bywire.core.errors import DeviceError
+from bywire.simulation import cuda
 from bywire.simulation.compiler import SINGLE, compile_library, find_compiler
-from bywire.simulation.cuda import emit_cuda, find_device
+from bywire.simulation.cuda import emit_cuda
+from bywire.simulation.cuda_device import find_device
 from bywire.simulation.engine import prepare
 from bywire.simulation.ensemble import Ensemble, simulate_ensemble
 from bywire.simulation.run import simulate
@@ -27,6 +29,7 @@ MASSES = np.linspace(0.8, 1.6, 70)
 
 
 def computed() -> Ensemble:
+    cuda.MOST = 64  # two batches, whose rows are lines of one array
     return simulate_ensemble(rig(0.024), {"m_1": MASSES}, ["x_1"], engine="cuda")
 
 
@@ -65,7 +68,8 @@ def test_what_comes_through_the_bindings_is_what_runs_give(tmp_path):
         "there = test_cuda_bindings.computed()\n"
         f"np.save({str(tmp_path / 'there.npy')!r}, there.values); print(there.engine)\n"
     )
-    environment = {"LD_LIBRARY_PATH": str(tmp_path), "EMULATED_KERNEL": str(kernel)}
+    libraries = os.pathsep.join((str(tmp_path), os.environ.get("LD_LIBRARY_PATH", "")))
+    environment = {"LD_LIBRARY_PATH": libraries, "EMULATED_KERNEL": str(kernel)}
     done = subprocess.run(
         [sys.executable, "-c", script],
         env={**os.environ, **environment},

@@ -9,7 +9,8 @@ import pytest
 
 from bywire.simulation.contacts import unresolved
 from bywire.simulation.engine import prepare
-from bywire.simulation.run import Run, doubts_of
+from bywire.simulation.run import Run
+from bywire.simulation.run_table import doubts_of
 from systems.two_mass import rig
 
 

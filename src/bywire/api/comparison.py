@@ -24,6 +24,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import is_result_folder, read_result, verdict_record
 from bywire.bench.running import Result
+from bywire.bench.step_choice import with_chosen_step
 from bywire.bench.step_error import are_distinct
 from bywire.bench.stimulus import STIMULI
 from bywire.core.callers import is_command_line
@@ -764,6 +765,7 @@ def _resolved(
 def _run(bench: Bench, progress: Progress | None, estimate_error: bool) -> Result:
     name = bench.name or bench.experiment
     report = None if progress is None else partial(_reported, progress, name)
+    bench = with_chosen_step(bench, progress=report)
     return running.run(bench, report, estimate_error=estimate_error)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from bywire.api.run_sections import choice_data, choice_texts
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError
@@ -128,12 +129,15 @@ class LifeResult(Answer):
             sections=lambda: [
                 Section("Life", [*warned, kpis]),
                 Section("Slow states", [states, FigureBlock(self._drawn, _CAPTION, "life")]),
-                Section("Stops", [Listing(self._population()), wear]),
+                Section(
+                    "Stops",
+                    [Listing([*choice_texts(plan.bench), *self._population()]), wear],
+                ),
                 subject.provenance(),
             ],
             brief=[
                 f"life {plan.name}: {plan.life.summary}",
-                Listing(self._population()),
+                Listing([*choice_texts(plan.bench), *self._population()]),
                 "",
                 *spaced([kpis, states]),
             ],
@@ -245,6 +249,7 @@ class LifeResult(Answer):
             "left": {name: float(values[-1]) for name, values in made.left.items()},
             "steps": [{"first": each.first, "stops": each.count} for each in made.steps],
             "population": self._population(),
+            **choice_data(made.plan.bench),
             "warnings": self.warnings,
         }
 

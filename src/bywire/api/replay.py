@@ -15,6 +15,7 @@ import xarray as xr
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.bench.experiment import without_step
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
@@ -374,6 +375,13 @@ def driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench
     InputError
         If the bench cannot be read, or a change is invalid.
     """
+    driven = _driven_bench(bench, changes)
+    if math.isnan(driven.step):
+        raise without_step("bywire chooses steps for the stimulus of a bench, not for measurements")
+    return driven
+
+
+def _driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench:
     if isinstance(bench, Bench):
         return bench.with_overrides(changes) if changes else bench
     try:

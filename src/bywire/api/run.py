@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bywire.api.run_sections import (
+    choice_data,
     energy,
     how_it_was_made,
     outcome,
@@ -24,6 +25,7 @@ from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
+from bywire.bench.step_choice import with_chosen_step
 from bywire.core.arguments import require_kinds
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Progress
@@ -343,6 +345,7 @@ class BenchResult(Result, Answer):
                 for label, books in self.ledgers().items()
             },
             "step_errors": self._step_errors(),
+            **choice_data(self.bench),
             "warnings": self.warnings,
         }
 
@@ -351,6 +354,7 @@ def run_once(
     bench: Bench, progress: Progress | None, engine: str, estimate_error: bool, animated: bool
 ) -> BenchResult:
     """Return the result of a bench (see `bywire.run`)."""
+    bench = with_chosen_step(bench, progress=progress)
     result = running.run(bench, progress, engine, estimate_error)
     return BenchResult(
         **{each.name: getattr(result, each.name) for each in fields(result)}, animated=animated
@@ -367,7 +371,7 @@ def bench_of(bench: Bench | str | Path, overrides: Mapping[str, str]) -> Bench:
     """
     if not isinstance(bench, Bench):
         return bench_file.read(bench, overrides)
-    return bench.with_overrides(overrides) if overrides else bench
+    return bench.with_overrides(overrides).without_choice() if overrides else bench
 
 
 def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
@@ -380,7 +384,7 @@ def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
     """
     if not faults:
         return bench
-    return replace(bench, faults=(*bench.faults, *map(from_text, faults)))
+    return replace(bench.without_choice(), faults=(*bench.faults, *map(from_text, faults)))
 
 
 def _remark(verdict: Verdict) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
-from bywire.api.run_sections import varied_texts
+from bywire.api.run_sections import choice_data, choice_texts, varied_texts
 from bywire.bench.kpis.kpi import Kpi
 from bywire.campaigns.residual import NEVER
 from bywire.campaigns.running import CampaignFindings, FaultFinding
@@ -199,6 +199,12 @@ class FaultCampaign(Answer):
             f"{cases.count} of {cases.cases} runs (95 % confidence interval: "
             f"{100 * cases.low:.3g} to {100 * cases.high:.3g} %)",
         ]
+        if plan.bench.choice is not None:
+            notes += [
+                *choice_texts(plan.bench),
+                "the stated error applies to the key figures of fault-free runs, not to the times "
+                "and effects of faults",
+            ]
         if not plan.varied:
             notes.append(
                 "nothing varies, so thresholds come from a single fault-free run. Add a [vary] "
@@ -431,6 +437,7 @@ class FaultCampaign(Answer):
             "thresholds": dict(findings.healthy.thresholds),
             "faults": [record_data(each, self._quantities.values()) for each in findings.faults],
             "warnings": self.warnings,
+            **choice_data(findings.plan.bench),
             "notes": self.notes,
         }
 

@@ -12,13 +12,14 @@ import numpy as np
 import xarray as xr
 
 from bywire.api.loop_case import spread
-from bywire.api.run_sections import fault_texts
+from bywire.api.run_sections import choice_data, choice_texts, fault_texts
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, run_benches, varied_leaf
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
+from bywire.bench.step_choice import exceeded, spread_over, with_chosen_step
 from bywire.bench.step_error import are_distinct
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array, Progress
@@ -89,9 +90,9 @@ class BenchRange(Answer):
         """Warnings of the runs, with their values."""
         warned: dict[str, list[float]] = {}
         for value, result in zip(self.values, self.results, strict=True):
-            for text in (*result.bench.outdated, *result.warnings):
+            for text in (*result.bench.outdated, *result.warnings, exceeded(result)):
                 warned.setdefault(text, []).append(value)
-        return [f"{text} ({self._at(values)})" for text, values in warned.items()]
+        return [f"{text} ({self._at(values)})" for text, values in warned.items() if text]
 
     def kpi(self, name: str) -> Array:
         """Return a key figure for every value, shape (values,), NaN where it is not defined.
@@ -128,7 +129,8 @@ class BenchRange(Answer):
         judged = list(self._judged())
         listing = [Listing([text for _, text in judged], "Requirements:")] if judged else []
         listing += [Listing(said)] if (said := self._indistinct()) else []
-        faults = [Listing(said)] if (said := fault_texts(bench)) else []
+        said = [*choice_texts(bench), *fault_texts(bench)]
+        faults = [Listing(said)] if said else []
         return Document(
             f"{title} over {self.name}",
             subject.line,
@@ -303,6 +305,7 @@ class BenchRange(Answer):
                 for value, result in zip(self.values, self.results, strict=True)
             ],
             "distinct": self._distinct,
+            **choice_data(self.bench),
             "warnings": self.warnings,
         }
 
@@ -350,7 +353,9 @@ def run_over(
         If interrupted.
     """
     name, unit, values = range_of_bench(bench, over)
-    benches = [changed(bench, {name: value}) for value in values]
+    cases = [{name: value} for value in values]
+    bench = with_chosen_step(bench, spread_over(cases), progress)
+    benches = [changed(bench, case) for case in cases]
     results = run_benches(benches, progress, engine, estimate_error=estimate_error)
     return BenchRange(bench, name, unit, tuple(values), results)
 

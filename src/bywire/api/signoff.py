@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
@@ -27,13 +27,16 @@ from bywire.report.document import (
     Section,
     TableBlock,
 )
+from bywire.report.identity import today
 from bywire.report.tables import OUTCOMES as OUTCOME_CELLS
 from bywire.report.tables import Cell, Column, Table, text_table
-from bywire.report.wording import amount, clean, measured_amount
+from bywire.report.wording import amount, beside_limit, clean, measured_amount
 from bywire.signoff.earlier import RECORD
+from bywire.signoff.exchange.requirements_file import Result
 from bywire.signoff.judging import Judged, judge_limit
 from bywire.signoff.junit import TestCase, junit_xml
-from bywire.signoff.plan import Evidence, SignOffPlan, Statement
+from bywire.signoff.plan import Evidence, SignOffPlan
+from bywire.signoff.statements import Statement
 from bywire.signoff.store import EVIDENCE, EvidenceStore, Kept
 
 _LIBRARIES = ("numpy", "scipy", "casadi")
@@ -302,7 +305,7 @@ class SignOff(Answer):
             ],
             data=self._data(),
             banner=Banner(text, word.get(self.outcome, "open")),
-            attachments=[Attachment("junit.xml", self._write_junit)],
+            attachments=list(self._attachments()),
             record=RECORD,
             remarks=[
                 f"requirement {each.statement.id} is {each.outcome}: {'; '.join(each.reasons)}"
@@ -401,14 +404,16 @@ class SignOff(Answer):
     @cached_property
     def changes(self) -> list[str]:
         """Changes since the earlier sign-off: texts, verdicts and computations."""
-        return list(_changes(self.previous, self._data())) if self.previous else []
+        return list(_changes(self.previous, self._verdicts_data())) if self.previous else []
 
     def _reproducibility(self) -> list[Block]:
         rows = [
             (Cell(clean(kept.title)), Cell(digest[:16]), Cell(kept.folder))
             for digest, kept in self.kept.items()
         ]
+        imported = self.plan.imported
         made = [
+            *([f"{clean(imported.file)}: SHA-256 {imported.digest}"] if imported else []),
             *(f"{name} {value}" for name, value in _versions()),
             f"machine: {_machine()}",
         ]
@@ -427,31 +432,46 @@ class SignOff(Answer):
     # --- Data
 
     def _data(self) -> dict[str, Any]:
+        imported = self.plan.imported
         return {
             "name": self.plan.name,
             "file": str(self.plan.file),
+            "imported": (
+                {"file": str(imported.file), "sha256": imported.digest} if imported else None
+            ),
             "verdict": self.outcome,
             "counts": {
                 each: sum(v.outcome == each for v in self.requirements)
                 for each in reversed(OUTCOMES)
             },
-            "requirements": [_verdict_data(each) for each in self.requirements],
-            "assumptions": [
-                _verdict_data(self.verdicts[each.id]) for each in self.plan.assumptions
-            ],
+            **self._verdicts_data(),
             "evidence_without_requirement": [
                 _shown_data(one) for one in self._shown if not one.evidence.shows
             ],
             "warnings": self.warnings,
             "since": self.compared_with,
-            "changes": list(self.__dict__.get("changes", ())),
+            "changes": self.changes,
             "bywire": __version__,
         }
 
-    def as_object(self) -> dict[str, Any]:
-        """Return the JSON object of the document."""
-        self.changes  # noqa: B018 - so that the data contain them
-        return super().as_object()
+    def _verdicts_data(self) -> dict[str, Any]:
+        return {
+            "requirements": [_verdict_data(each) for each in self.requirements],
+            "assumptions": [
+                _verdict_data(self.verdicts[each.id]) for each in self.plan.assumptions
+            ],
+        }
+
+    def _attachments(self) -> Iterator[Attachment]:
+        yield Attachment("junit.xml", self._write_junit)
+        if self.plan.imported is not None:
+            yield Attachment(self.plan.imported.results_name, self._write_imported)
+
+    def _write_imported(self, path: Path) -> Path:
+        assert self.plan.imported is not None
+        results = {each.statement.id: _result(each) for each in self.requirements}
+        path.write_bytes(self.plan.imported.with_results(results))
+        return path
 
     def _write_junit(self, path: Path) -> Path:
         cases = [
@@ -521,7 +541,14 @@ def _value(judged: Judged) -> str:
         return "-"
     if _is_in_decibel(judged):
         return f"{_decibel(judged.value):.4g} dB"
-    return measured_amount(judged.value, judged.unit, judged.error)
+    value, error, unit = _beside_limit(judged)
+    return measured_amount(value, unit, error)
+
+
+def _beside_limit(judged: Judged) -> tuple[float | None, float, str]:
+    """Return value, error and unit: in percent where the limit is in percent."""
+    limit = judged.limit.partition(" with ")[0]
+    return beside_limit(judged.value, judged.error, judged.unit, limit)
 
 
 def _is_in_decibel(judged: Judged) -> bool:
@@ -535,7 +562,8 @@ def _decibel(factor: float) -> float:
 def _error(judged: Judged) -> str:
     if not judged.unit or not math.isfinite(judged.error) or math.isnan(judged.value):
         return "-"
-    return amount(judged.error, difference_unit(judged.unit), 2, like=_size(judged))
+    value, error, unit = _beside_limit(judged)
+    return amount(error, difference_unit(unit), 2, like=_finite(value))
 
 
 def _room(judged: Judged) -> str:
@@ -546,16 +574,38 @@ def _room(judged: Judged) -> str:
         bound = judged.value - judged.room if is_least else judged.value + judged.room
         room = _decibel(judged.value) - _decibel(bound)
         return f"{room if is_least else -room:.3g} dB"
-    return amount(judged.room, difference_unit(judged.unit), 3, like=_size(judged))
+    value, _, unit = _beside_limit(judged)
+    room = judged.room * (100.0 if unit != judged.unit else 1.0)
+    return amount(room, difference_unit(unit), 3, like=_finite(value))
 
 
-def _size(judged: Judged) -> float | None:
+def _finite(value: float | None) -> float | None:
     """Return the value if it determines the unit of the numbers beside it."""
-    return judged.value if math.isfinite(judged.value) else None
+    return value if value is not None and math.isfinite(value) else None
 
 
 def _shortened(text: str) -> str:
     return text if len(text) <= _SHORT else f"{text[: _SHORT - 3]}..."
+
+
+def _result(verdict: Verdict) -> Result:
+    """Return a verdict for the file from which the requirement comes."""
+    pieces = [(one, judged) for one in verdict.shown for judged in one.judged]
+
+    def lines(texts: Iterable[str]) -> str:
+        return "\n".join(
+            "" if text == "-" else " ".join(clean(text).split()) for text in texts
+        ).rstrip("\n")
+
+    return Result(
+        verdict.outcome,
+        lines(verdict.reasons),
+        lines(one.evidence.task.title for one, _ in pieces),
+        lines(_value(judged) for _, judged in pieces),
+        lines(judged.limit for _, judged in pieces),
+        lines(_room(judged) for _, judged in pieces),
+        today(),
+    )
 
 
 def _verdict_data(verdict: Verdict) -> dict[str, Any]:

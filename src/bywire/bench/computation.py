@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -69,10 +70,12 @@ def bench_identity(bench: Bench, choices: Iterable[Mapping[str, Any]] = ()) -> d
             name: [each.kind, each.parameters.model_dump(mode="json")]
             for name, each in bench.chosen_stimuli.items()
         },
-        "step": bench.step,
+        "step": None if math.isnan(bench.step) else bench.step,
         "record": bench.record,
         "noise": bench.seed,
     }
+    if bench.error is not None:
+        identity["error"] = float(bench.error)
     if bench.faults:
         identity["faults"] = bench.faults
     if bench.engine.startswith("sil"):  # all other engines compute the same bits

@@ -17,6 +17,7 @@ import numpy as np
 
 from bywire.core.signals import Role, signals_of
 from bywire.simulation.run import Run
+from bywire.simulation.run_table import change, one_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -349,7 +350,7 @@ def _losses(runs: Sequence[Run]) -> Collection[str] | None:
     A contact's loss includes the energy of a change in its parameters (see
     `bywire.simulation.advance`).
     """
-    return runs[0].model.Flow._fields if any(run.changes for run in runs) else None
+    return one_of(runs).model.Flow._fields if change(runs) else None
 
 
 def _is_delivered(delivery: Delivery) -> Any:

@@ -8,22 +8,26 @@ import math
 from collections.abc import Callable, Collection, ItemsView, Iterator, Mapping, Sequence, ValuesView
 from functools import cache, cached_property
 from numbers import Number
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from bywire.bench.energy_ledger import energy_doubts, energy_signals, role_attributes
+from bywire.core.on_demand import OnDemand
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.typing import Array
 from bywire.core.version import __version__
 from bywire.simulation.advance import put_in_signals
 from bywire.simulation.ensemble import RunGroup
-from bywire.simulation.run import Run, Trajectory, doubts_of
+from bywire.simulation.run import Run, Trajectory
+from bywire.simulation.run_table import doubts_of, one_of, parameters_of
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from bywire.simulation.cuda import HeldRows
 
 
 def parameter_hash(par: ParameterSet) -> str:
@@ -98,18 +102,19 @@ def rows_of(
 
 def rows_of_group(group: RunGroup, settle: float) -> Rows:
     """Return the content of the recordings of several runs, for the computed rows."""
-    signals = dict(zip(group.names, group.values, strict=True))
-    attributes = _attributes_of(group.runs[0].model.Output)
-    return Rows(
+    signals = group.signals
+    attributes = _attributes_of(one_of(group.runs).model.Output)
+    rows = Rows(
         np.round(group.time - settle, 12), signals, {name: attributes[name] for name in signals}
     )
+    rows.held = None if group.held is None else Held(group.held, group.names)
+    return rows
 
 
 def ends_of_group(group: RunGroup) -> Rows:
     """Return the first and last rows of several runs, with all signals that are recorded there."""
-    values = {name: each[:, [0, -1]] for name, each in zip(group.names, group.values, strict=True)}
-    values |= zip(group.end_names, group.ends, strict=True)
-    attributes = _attributes_of(group.runs[0].model.Output)
+    values = {**group.edges, **dict(zip(group.end_names, group.ends, strict=True))}
+    attributes = _attributes_of(one_of(group.runs).model.Output)
     signals = {name: values[name] for name in attributes if name in values}
     return Rows(group.time[[0, -1]], signals, {name: attributes[name] for name in signals})
 
@@ -143,7 +148,7 @@ def watch_cases(
     iteration's limit; ``books``: `energy_doubts` of each run.
     """
     solver = map(solver_doubts, doubts_of(runs), unsettled)
-    model, pars = runs[0].model, [run.par for run in runs]
+    model, pars = one_of(runs).model, parameters_of(runs)
     rows.silent = model.silent(rows, pars)
     asked = set(model.may_warn(rows, pars))
     return [
@@ -282,6 +287,22 @@ def _window(time: Array, asked: tuple[Any, ...], given: Mapping[str, Any]) -> sl
     return slice(begin, max(begin, end))
 
 
+class Held(NamedTuple):
+    """Rows of several runs that a graphics processor holds, and the names of their signals."""
+
+    rows: HeldRows
+    names: tuple[str, ...]
+
+    def address(self, name: str) -> int:
+        """Return the address of a signal's rows in the first run; other runs follow."""
+        return self.rows.address(self.names.index(name))
+
+    def extremes(self, name: str) -> Array:
+        """Return the first, lowest, highest and last row of a signal, shape (runs, 4)."""
+        extremes: Array = self.rows.extremes[self.names.index(name)]
+        return extremes
+
+
 class Rows:
     """Recorded rows of a run, or of several runs side by side.
 
@@ -314,10 +335,15 @@ class Rows:
         par: ParameterSet | None = None,
     ) -> None:
         self._notes, self.par = notes, par
-        self._values = {**signals, TIME: time}  # the time keeps its place among the signals
+        self._values: Mapping[str, Array] = (
+            {**signals, TIME: time}  # the time keeps its place among the signals
+            if isinstance(signals, dict)
+            else OnDemand((*signals, TIME), lambda name: time if name == TIME else signals[name])
+        )
         self._attributes = {**attributes, TIME: {"units": "s", "long_name": "time"}}
         self._signals = tuple(name for name in signals if name != TIME)
         self.silent: frozenset[str] = frozenset()  # parts of the model without warnings
+        self.held: Held | None = None  # by a graphics processor
         self.sizes = {TIME: time.size}
 
     @classmethod
@@ -342,6 +368,28 @@ class Rows:
         rows.__dict__["dataset"] = recording  # available already
         return cast("xr.Dataset", rows)  # it has the same interface
 
+    def outline(self, name: str) -> Array | None:
+        """Return first, lowest, highest and last values of a signal in each run, shape (runs, 4).
+
+        None for rows that a graphics processor does not hold, or that are not finite.
+        """
+        values = None if self.held is None else self.held.extremes(name)
+        return None if values is None or not np.isfinite(values).all() else values
+
+    def outlined(self) -> Rows | None:
+        """Return rows with the first, lowest, highest and last value of each signal.
+
+        None for rows that a graphics processor does not hold.
+        """
+        if self.held is None:
+            return None
+        time = self._values[TIME][[0, 0, -1, -1]]
+        return Rows(time, OnDemand(self._signals, self.held.extremes), self._attributes)
+
+    def unit(self, name: str) -> str:
+        """Return the SI unit of a signal; ``"1"`` if none is recorded."""
+        return str(self._attributes[name].get("units", "1"))
+
     def case(
         self,
         k: int,
@@ -349,8 +397,13 @@ class Rows:
         par: ParameterSet | None = None,
     ) -> Rows:
         """Return the rows of one run of several."""
-        signals = {name: self._values[name][k] for name in self._signals}
-        rows = Rows(self._values[TIME], signals, self._attributes, notes, par)
+        values = self._values
+        signals: Mapping[str, Array] = (
+            {name: values[name][k] for name in self._signals}
+            if isinstance(values, dict)
+            else OnDemand(self._signals, lambda name: values[name][k])
+        )
+        rows = Rows(values[TIME], signals, self._attributes, notes, par)
         rows.silent = self.silent
         return rows
 
@@ -390,7 +443,7 @@ class Rows:
             return self.dataset.assign(given)
         known = {name: each for name, each in plain.items() if each is not None}
         return self._like(
-            self._values | {name: values for name, (values, _) in known.items()},
+            {**self._values, **{name: values for name, (values, _) in known.items()}},
             {**self._attributes, **{name: attrs for name, (_, attrs) in known.items()}},
         )
 

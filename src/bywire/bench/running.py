@@ -304,7 +304,7 @@ def judged(
     return Result(bench, Recordings(recordings), kpis, verdicts, status_of(verdicts))
 
 
-def _bench_notes(bench: Bench) -> dict[str, str]:
+def _bench_notes(bench: Bench) -> dict[str, Any]:
     """Return the attributes of a recording that describe its bench."""
     return {
         "model": bench.system,
@@ -313,6 +313,7 @@ def _bench_notes(bench: Bench) -> dict[str, str]:
         "options": bench.chosen_options.model_dump_json(),
         "stimulus": json.dumps(_described(bench.chosen_stimuli)),
         **({"faults": json.dumps(bench.faults, default=str)} if bench.faults else {}),
+        **({} if bench.error is None else {"stated_error": float(bench.error)}),
     }
 
 

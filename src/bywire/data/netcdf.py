@@ -94,8 +94,8 @@ def _write_rows(recording: xr.Dataset, path: Path) -> None:
             (file.setncattr_string if is_list else file.setncattr)(name, value)
         file.createDimension("time", recording.sizes["time"])
         for name, row in recording.variables.items():
-            packed = _PACKED if name in recording.data_vars else {}
-            variable = file.createVariable(name, "f8", ("time",), fill_value=np.nan, **packed)
+            packed: dict[str, Any] = _PACKED if name in recording.data_vars else {}
+            variable = file.createVariable(str(name), "f8", ("time",), fill_value=np.nan, **packed)
             variable.setncatts(row.attrs)
             variable[...] = row.values
 

@@ -117,19 +117,7 @@ def _require_numbers(value: Any, file: Path, key: str) -> None:
 
 
 def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str) -> str:
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
-        hint = missing(file) if isinstance(error, FileNotFoundError) else _ADVICE
-        raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
-    if len(data) > LARGEST:
-        raise FileError(
-            f"{file} is larger than {LARGEST // 1000} kB, which is too large for a {kind}"
-            f"{too_large}",
-            name=str(file),
-        )
+    data = limited_bytes(file, kind, missing=missing, too_large=too_large)
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError:
@@ -140,14 +128,57 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
         ) from None
 
 
+def limited_bytes(
+    file: Path,
+    kind: str,
+    most: int = LARGEST,
+    *,
+    missing: Callable[[Path], str] = _no_idea,
+    too_large: str = "",
+) -> bytes:
+    """Return the content of a file of limited size.
+
+    Parameters
+    ----------
+    file
+        Path of the file.
+    kind
+        Its name in errors.
+    most
+        Maximum size in bytes.
+    missing, too_large
+        Next steps, see `read_toml`.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read or is too large.
+    """
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(most + 1)
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
+        hint = missing(file) if isinstance(error, FileNotFoundError) else _ADVICE
+        raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
+    if len(data) > most:
+        raise FileError(
+            f"{file} is larger than {most // 1000} kB, which is too large for a {kind}{too_large}",
+            name=str(file),
+        )
+    return data
+
+
 # --- Kinds of files
 
-BENCH, STUDY, LIFE, CAMPAIGN, SIGNOFF = "bench", "study", "life", "campaign", "sign-off"
+BENCH, STUDY, LIFE, CAMPAIGN = "bench", "study", "life", "campaign"
+PROCEDURE, SIGNOFF = "procedure", "sign-off"
 _COMMANDS = {
     BENCH: "bywire run",
     STUDY: "bywire study run",
     LIFE: "bywire life",
     CAMPAIGN: "bywire faults",
+    PROCEDURE: "bywire procedure",
     SIGNOFF: "bywire signoff",
 }
 _WORDS = {
@@ -155,6 +186,7 @@ _WORDS = {
     STUDY: "a study",
     LIFE: "a life",
     CAMPAIGN: "a fault campaign",
+    PROCEDURE: "a procedure",
     SIGNOFF: "a sign-off",
 }
 HEADS = {
@@ -162,6 +194,7 @@ HEADS = {
     STUDY: "bench",
     LIFE: "life",
     CAMPAIGN: "bench",
+    PROCEDURE: "procedure",
     SIGNOFF: "requirement",
 }
 """required key of each kind"""
@@ -183,6 +216,8 @@ def kind_of(content: Mapping[str, Any]) -> str:
         return SIGNOFF
     if "life" in keys:
         return LIFE
+    if "procedure" in keys:
+        return PROCEDURE
     if "bench" not in keys:
         return BENCH if "experiment" in keys else ""
     if not keys & _NEVER_IN_STUDIES:
@@ -207,7 +242,7 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     content
         Content of the file.
     wanted
-        `BENCH`, `STUDY`, `LIFE`, `CAMPAIGN` or `SIGNOFF`.
+        `BENCH`, `STUDY`, `LIFE`, `CAMPAIGN`, `PROCEDURE` or `SIGNOFF`.
     file
         Path of the file.
 
@@ -218,8 +253,9 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     """
     kind = kind_of(content)
     head = HEADS[wanted]
-    if not kind or kind == wanted or (head in content and head != HEADS[kind]):
-        return
+    has_head = head in content and head != HEADS[kind] if kind else False
+    if not kind or kind == wanted or (has_head and kind != PROCEDURE):
+        return  # a procedure also names an experiment, like a bench
     raise ParameterError(
         f"this is {_WORDS[kind]}, not {_WORDS[wanted]}. Use '{_COMMANDS[kind]} {file}'",
         name=str(file),

@@ -102,7 +102,7 @@ def judge_limit(limit: Limit, figures: Sequence[FigureAt]) -> Judged:
     )
     note = worst.kpi.note if math.isnan(verdict.value) else ""
     if outcome == "undecided" and not note:
-        note = "closer to the limit than its numerical error"
+        note = "closer to the limit than its error"
     return Judged(
         outcome,
         text,

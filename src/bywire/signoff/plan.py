@@ -11,60 +11,11 @@ from typing import Any
 
 from bywire.bench.requirements import Limit
 from bywire.cases.identity import as_json, digest_of
-from bywire.core.errors import ParameterError
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
+from bywire.signoff.exchange.importing import Imported
 from bywire.signoff.judging import Judged
-
-
-@dataclass(frozen=True)
-class Place:
-    """Line of a file, for errors.
-
-    Parameters
-    ----------
-    file
-        The file.
-    line
-        Number of the line; 0 if the file has no lines.
-    """
-
-    file: Path
-    line: int = 0
-
-    def __str__(self) -> str:
-        return f"{self.file}, line {self.line}" if self.line else str(self.file)
-
-
-@dataclass(frozen=True)
-class Statement:
-    """Requirement, or an assumption on which requirements rely.
-
-    Parameters
-    ----------
-    id
-        Unique name, as in the system that manages the requirements.
-    text
-        The statement itself.
-    source
-        Document and section from which it comes; may be empty.
-    group
-        Heading under which the document lists it; may be empty.
-    assumes
-        Names of the assumptions on which it relies.
-    is_assumption
-        Whether it is an assumption.
-    place
-        Its place in a file.
-    """
-
-    id: str
-    text: str
-    source: str = ""
-    group: str = ""
-    assumes: tuple[str, ...] = ()
-    is_assumption: bool = False
-    place: Place = Place(Path())
+from bywire.signoff.statements import NOWHERE, Place, Statement
 
 
 class Task(ABC):
@@ -173,7 +124,7 @@ class Evidence:
     limits: tuple[Limit, ...]
     shows: tuple[str, ...]
     note: str = ""
-    place: Place = Place(Path())
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)
@@ -193,7 +144,7 @@ class SignOffPlan:
     signatures
         Roles of the people who sign.
     imported
-        File from which the requirements come; None if they are in the sign-off file itself.
+        File of another tool from which requirements come; None if all are in the sign-off file.
     """
 
     name: str
@@ -202,7 +153,7 @@ class SignOffPlan:
     assumptions: tuple[Statement, ...] = ()
     evidence: tuple[Evidence, ...] = ()
     signatures: tuple[str, ...] = ()
-    imported: Path | None = None
+    imported: Imported | None = None
 
     @property
     def statements(self) -> Iterator[Statement]:
@@ -221,53 +172,3 @@ class SignOffPlan:
     def evidence_for(self, id: str) -> tuple[Evidence, ...]:
         """Return the evidence for a statement."""
         return tuple(each for each in self.evidence if id in each.shows)
-
-
-def require_sound(statements: Sequence[Statement]) -> None:
-    """Reject two statements with one name, unknown assumptions, and circles of assumptions.
-
-    Raises
-    ------
-    ParameterError
-        With the place in the file.
-    """
-    known: dict[str, Statement] = {}
-    for each in statements:
-        if each.id in known:
-            raise ParameterError(
-                f"{each.place}: id {each.id!r} appears twice (first in {known[each.id].place}). "
-                "Each requirement and assumption needs its own id",
-                name="id",
-                value=each.id,
-            )
-        known[each.id] = each
-    for each in statements:
-        for name in each.assumes:
-            if name not in known or not known[name].is_assumption:
-                raise ParameterError(
-                    f"{each.place}: assumes contains {name!r}, which is not an assumption. Add an "
-                    f"[[assumption]] with this id, or remove {name!r}",
-                    name="assumes",
-                    value=name,
-                )
-    settled: set[str] = set()
-    for each in statements:
-        _require_no_circle(each, known, (), settled)
-
-
-def _require_no_circle(
-    each: Statement, known: Mapping[str, Statement], above: tuple[str, ...], settled: set[str]
-) -> None:
-    if each.id in above:
-        circle = " -> ".join((*above[above.index(each.id) :], each.id))
-        raise ParameterError(
-            f"{each.place}: assumptions rely on each other in a circle ({circle}). Remove one of "
-            "these entries of assumes",
-            name="assumes",
-            value=circle,
-        )
-    if each.id in settled:
-        return
-    for name in each.assumes:
-        _require_no_circle(known[name], known, (*above, each.id), settled)
-    settled.add(each.id)

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from bywire.bench.requirements import Limit
-from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
-from bywire.core.section import Hint, Name, Names, Section
+from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
+from bywire.core.section import Hint, Name, Names, Section, Table
 from bywire.data.toml_file import SIGNOFF, entry_lines, read_toml, require_kind
-from bywire.signoff.plan import (
-    Evidence,
-    Place,
-    SignOffPlan,
-    Statement,
-    Task,
-    require_sound,
-)
+from bywire.signoff.exchange.importing import AttributeNames, Imported, imported_from
+from bywire.signoff.plan import Evidence, SignOffPlan, Task
+from bywire.signoff.statements import Place, Statement, placed, require_id, require_sound
 
 Arguments = Mapping[str, Any]
 Readers = Mapping[str, Callable[[str, Arguments, Path], Task]]
@@ -28,7 +22,6 @@ Readers = Mapping[str, Callable[[str, Arguments, Path], Task]]
 _REQUIREMENT, _ASSUMPTION, _EVIDENCE = "requirement", "assumption", "evidence"
 _OWN = ("shows", "limit", "note")
 """keys of every ``[[evidence]]``"""
-_LONGEST = 200  # characters of an id
 _SIGNATURES = ("prepared", "reviewed", "released")
 
 
@@ -50,17 +43,15 @@ class SignOffFile(Section):
 
     name: Name
     requirements: str = ""
+    attributes: AttributeNames = AttributeNames()
+    only: Table
     signatures: Names = _SIGNATURES
     requirement: _Tables = ()
     assumption: _Tables = ()
     evidence: _Tables = ()
 
 
-def read_signoff(
-    path: str | Path,
-    readers: Readers,
-    imported: Callable[[Path], Sequence[Statement]] | None = None,
-) -> SignOffPlan:
+def read_signoff(path: str | Path, readers: Readers) -> SignOffPlan:
     """Read a sign-off file with the files to which it refers.
 
     Parameters
@@ -69,8 +60,6 @@ def read_signoff(
         TOML file; see ``docs/signoff.md``.
     readers
         Kinds of evidence.
-    imported
-        Reads the requirements of another file, such as ReqIF or CSV.
 
     Raises
     ------
@@ -82,16 +71,16 @@ def read_signoff(
     file = Path(path)
     content = read_toml(file, "sign-off file")
     lines = entry_lines(file)
-    with _placed(Place(file)):
+    with placed(Place(file)):
         require_kind(content, SIGNOFF, file)
         read = SignOffFile.read({"name": file.stem, **content}, "a sign-off file")
     statements = [
         *_statements(read.requirement, _REQUIREMENT, file, lines),
         *_statements(read.assumption, _ASSUMPTION, file, lines),
     ]
-    source = file.parent / read.requirements if read.requirements else None
-    if source is not None and imported is not None:
-        statements = [*imported(source), *statements]
+    imported = _imported(read, file)
+    if imported is not None:
+        statements = [*imported.statements, *statements]
     if not statements:
         raise ParameterError(
             f"{file} contains no requirement. Add a [[requirement]] with id and text, or name a "
@@ -110,17 +99,22 @@ def read_signoff(
         tuple(each for each in statements if each.is_assumption),
         _together(evidence),
         read.signatures,
-        source,
+        imported,
     )
 
 
-@contextmanager
-def _placed(place: Place) -> Iterator[None]:
-    """Add the place in a file to errors in the user's input."""
-    try:
-        yield
-    except InputError as error:
-        raise error.reworded(f"{place}: {error}") from None
+def _imported(read: SignOffFile, file: Path) -> Imported | None:
+    """Return the requirements of the file that a sign-off file names, or None."""
+    if read.requirements:
+        return imported_from(file.parent / read.requirements, read.attributes, read.only)
+    for key in ("attributes", "only"):
+        if key in read.given:
+            raise ParameterError(
+                f"{file}: [{key}] needs a file with requirements. Add requirements = "
+                '"FILE.csv" or "FILE.reqif"',
+                name=key,
+            )
+    return None
 
 
 def _entries(
@@ -144,7 +138,7 @@ def _statements(
 ) -> Iterator[Statement]:
     for entry, line in _entries(value, name, file, lines):
         place = Place(file, line)
-        with _placed(place):
+        with placed(place):
             section = StatementSection.read(entry, f"[[{name}]]")
             require_id(section.id)
         yield Statement(
@@ -158,24 +152,10 @@ def _statements(
         )
 
 
-def require_id(id: str) -> None:
-    """Reject an id that is too long or not in one line.
-
-    Raises
-    ------
-    ParameterError
-        With the id.
-    """
-    if len(id) > _LONGEST or not id.isprintable() or id != id.strip():
-        raise not_valid(
-            "id", quoted(id), f"printable text in one line of at most {_LONGEST} characters"
-        )
-
-
 def _evidence(
     entry: dict[str, Any], place: Place, readers: Readers, statements: Sequence[Statement]
 ) -> Evidence:
-    with _placed(place):
+    with placed(place):
         kinds = [key for key in entry if key in readers]
         if not kinds:
             unknown = [key for key in entry if key not in _OWN]
@@ -214,13 +194,13 @@ def _together(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
     made: list[Evidence] = []
     first: dict[str, Evidence] = {}
     for each in evidence:
-        with _placed(each.place):
+        with placed(each.place):
             task = each.task.with_limits(tuple(limits[each.task.title].values()))
             other = first.setdefault(task.shelf, replace(each, task=task))
             if other.task.digest != task.digest:
                 raise ParameterError(
-                    f"this is the same computation as in {other.place}, with other settings. Use "
-                    "the same settings in both, or remove one of them",
+                    f"[[evidence]] repeats the computation of {other.place} with other settings. "
+                    "Use the same settings in both, or remove one of them",
                     name="[[evidence]]",
                     value=task.title,
                 )

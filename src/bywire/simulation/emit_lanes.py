@@ -6,9 +6,9 @@ kernel then alternates two vectors, statement by statement. One computes while t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 
-from bywire.simulation.branches import modes
+from bywire.simulation.branches import Arms, branched, modes
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emit_rare import most_tries, rare_roots, rare_substep
 from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
@@ -90,6 +90,58 @@ class Lanes:
         """Return the statements of nodes; ``later``: other nodes that read them."""
         return branching_statements(self.graph, order, self.name, "const V ", VECTOR_C, later)
 
+    def branching(self, order: Sequence[Node], later: Sequence[Node] = ()) -> list[str]:
+        """Return the statements of a substep's nodes, without the arms that no lane selects.
+
+        ``later``: other nodes that read them.
+        """
+        read = set(self.pass_roots)
+        stack = [a for node in later for a in self.graph.arguments(node)]
+        while stack:
+            node = stack.pop()
+            read.add(node)
+            if self.graph.is_boolean(node):  # its text contains its arguments
+                stack.extend(self.graph.arguments(node))
+        return self._branching(order, read, later)
+
+    def _branching(
+        self, order: Sequence[Node], kept: Collection[Node], later: Sequence[Node]
+    ) -> list[str]:
+        left, arms = branched(self.graph, order, kept)
+        lines: list[str] = []
+        while left:
+            at = next((k for k, node in enumerate(left) if node in arms), len(left))
+            lines += self.lines(left[:at], (*left[at:], *later))
+            if at < len(left):
+                lines.append(self._selected(left[at], arms[left[at]], kept))
+            left = left[at + 1 :]
+        return lines
+
+    def _selected(self, node: Node, arms: Arms, kept: Collection[Node]) -> str:
+        """Return the C text of a selection that computes an arm only if a lane selects it."""
+        truth, *ends = self.graph.nodes[node].args
+        test, own = condition(self.graph, truth, self.name, VECTOR_C), self.name(node)
+        declared, parts, values = [], [], []
+        for k, (arm, end) in enumerate(zip(arms, (*ends, None), strict=False)):
+            value = "SET(0.0)" if end is None else self.number(end)
+            if not arm.nodes and not arm.taken:
+                values.append(value)
+                continue
+            values.append(f"{own}_{k}")
+            declared += [f"V kept_{self.name(n)} = SET(0.0);" for n in arm.kept]
+            declared.append(f"V {own}_{k} = SET(0.0);")
+            body = [
+                *(f"const V {self.name(n)} = kept_{self.name(n)};" for n in arm.taken),
+                *self._branching(arm.nodes, {*kept, *arm.kept}, ()),
+                *(f"kept_{self.name(n)} = {self.name(n)};" for n in arm.kept),
+                f"{own}_{k} = {value};",
+            ]
+            taken = f"NOT(if_{own})" if k else f"if_{own}"
+            parts.append(f"if (ANY({taken})) {{\n        {indented(body, 8)}\n      }}")
+        selected = VECTOR_C.select.format(c=f"if_{own}", a=values[0], b=values[1])
+        lines = [f"const B if_{own} = {test};", *declared, *parts, f"const V {own} = {selected};"]
+        return indented(lines, 6)
+
     def number(self, node: Node) -> str:
         """Return the C text of a result."""
         return as_number(self.graph, node, self.name, VECTOR_C)
@@ -121,7 +173,7 @@ class Lanes:
         They recompute values that depend on the mode when the mode changes.
         """
         mode = self.mode
-        rest = self.lines(self._judged, self._later)
+        rest = self.branching(self._judged, self._later)
         if not mode.atoms:
             return rest
         changed = " | ".join(f"(n{n} ^ b{n})" for n in mode.atoms)
@@ -144,7 +196,7 @@ class Lanes:
         for k, product in enumerate(self.products):
             read = self._read_by([product])
             order, rest = [n for n in rest if n in read], [n for n in rest if n not in read]
-            lines += [*self.lines(order, rest), f"s{k}{self.mark} += {self.number(product)};"]
+            lines += [*self.branching(order, rest), f"s{k}{self.mark} += {self.number(product)};"]
         return lines
 
     def finished(self, is_summed: bool = True) -> list[str]:
@@ -154,7 +206,7 @@ class Lanes:
         """
         there = self._read_by(self.products if is_summed else ())
         needed_nodes = self._read_by(self.results.values()) - there
-        return self.lines([n for n in self._later if n in needed_nodes])
+        return self.branching([n for n in self._later if n in needed_nodes])
 
 
 # --- Lanes whose substep needs more than one ordinary pass

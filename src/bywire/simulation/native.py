@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -111,6 +111,10 @@ class Inputs:
         for k, rows in zip(own.tolist(), apart, strict=True):
             values[k] = rows
         return cls(tuple(values))
+
+    def with_noise(self, noise: Mapping[int, Array]) -> Inputs:
+        """Return these inputs with other numbers by column, shape (cases, rows) each."""
+        return Inputs(tuple(noise.get(k, values) for k, values in enumerate(self.values)))
 
 
 def plan_array(schedule: Schedule, begin: int, end: int, selected: int) -> NDArray[np.int64]:

@@ -25,7 +25,7 @@ from bywire.core.machine import worker_count
 from bywire.data.file_format import library
 from bywire.simulation.engine import CUDA
 from bywire.studies.plan import StudyPlan
-from bywire.studies.store import Columns, PlacedChunk, computed_chunk, computed_chunks, number_of
+from bywire.studies.store import Columns, PlacedChunk, computed_chunks
 
 _Chunks = Iterable[int | PlacedChunk]
 T = TypeVar("T")
@@ -103,14 +103,62 @@ def batched(chunks: _Chunks, size: int) -> Iterator[list[int | PlacedChunk]]:
         yield several
 
 
-def single(chunk: int | PlacedChunk, plan: StudyPlan) -> tuple[int, Columns]:
-    """Return the number and the columns of a chunk, computed on one core."""
-    return number_of(chunk), computed_chunk(plan, chunk, threads=1)
+_AHEAD = 2  # tasks in flight for each worker, so that no worker is idle
+# Chunks that are computed together share their setup, but all of their rows need memory.
+_MOST = 4
+
+_Task = tuple[float, list[tuple[int, Columns]]]
+"""result of a task: time [s], and its chunks"""
+
+
+class _Tasks:
+    """Tasks of several chunks, which take about the same time until few chunks are left.
+
+    Parameters
+    ----------
+    chunks
+        The chunks.
+    workers
+        Number of workers that share them.
+    seconds
+        Target duration of a task [s].
+    most
+        Maximum number of chunks in a task.
+    """
+
+    def __init__(
+        self, chunks: _Chunks, workers: int, seconds: float, most: int | None = None
+    ) -> None:
+        self._left, self._workers = deque(chunks), workers
+        self._seconds, self._most, self._size = seconds, most, 1
+
+    def __iter__(self) -> Iterator[list[int | PlacedChunk]]:
+        while task := self.next():
+            yield task
+
+    def next(self) -> list[int | PlacedChunk]:
+        """Return the chunks of the next task; none if all are in tasks."""
+        share = -(-len(self._left) // (_AHEAD * self._workers))
+        return [self._left.popleft() for _ in range(min(self._size, share))]
+
+    def measured(self, task: _Task) -> list[tuple[int, Columns]]:
+        """Return the chunks of a finished task, whose time determines the size of the next ones."""
+        seconds, given = task
+        size = max(1, round(self._seconds * len(given) / max(seconds, 1e-9)))
+        self._size = size if self._most is None else min(size, self._most)
+        return given
+
+
+def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan, threads: int | None = 1) -> _Task:
+    """Return chunks, of which several are computed together, and their computing time."""
+    begin = time.perf_counter()
+    batches = (computed_chunks(plan, batch, threads) for batch in batched(chunks, _MOST))
+    given = [computed for batch in batches for computed in batch]
+    return time.perf_counter() - begin, given
 
 
 # --- On a cluster of dask.distributed
 
-_AHEAD = 2  # tasks in flight for each worker, so that no worker is idle
 _SECONDS = 10.0  # time limit to reach a cluster
 _TASK = 0.5  # s: target duration of a task of a cluster
 # Dask works periodically: stack samples every 10 ms, ticks every 20 ms, memory checks every 100 ms.
@@ -129,10 +177,6 @@ CLUSTER_MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1
 _LOST = "the cluster lost its workers ({}). Resume the study when workers are available again"
 _GONE = "the cluster's scheduler is gone. Restart it, or use other workers, and resume the study"
 _WHAT = ("studies on a cluster", "cluster")
-
-
-_Task = tuple[float, list[tuple[int, Columns]]]
-"""result of a task of a cluster: time [s], and its chunks"""
 
 
 class Cluster:
@@ -185,42 +229,31 @@ def _client(address: str) -> Iterator[Any]:
         log.setLevel(before)
 
 
-def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan) -> _Task:
-    """Return chunks one after the other, and their computing time."""
-    begin = time.perf_counter()
-    given = [single(chunk, plan) for chunk in chunks]
-    return time.perf_counter() - begin, given
-
-
 def _of_cluster(
     client: Any, plan: StudyPlan, workers: int, chunks: _Chunks
 ) -> Iterator[tuple[int, Columns]]:
     """Yield the finished chunks of a cluster, with few tasks in flight.
 
-    The overhead of a task equals some cases. A task therefore has as many chunks as take about
-    `_TASK`, but near the end no more than each worker's share.
+    The overhead of a task equals some cases, so that a task should take about `_TASK`.
     """
     distributed = library("distributed", *_WHAT)
     # Send the plan once to every worker; otherwise each task would set up the bench again.
     kept = client.scatter(plan, broadcast=True, hash=False)
-    left, size = deque(chunks), 1
+    tasks = _Tasks(chunks, workers, _TASK)
     with client.as_current():
-        tasks = distributed.as_completed(with_results=True)
+        begun = distributed.as_completed(with_results=True)
 
     def submit() -> None:
-        share = -(-len(left) // (_AHEAD * workers))
-        task = [left.popleft() for _ in range(min(size, share))]
-        if task:
-            tasks.add(client.submit(_timed, task, plan=kept, pure=False))
+        if task := tasks.next():
+            begun.add(client.submit(_timed, task, plan=kept, pure=False))
 
     try:
         for _ in range(_AHEAD * workers):
             submit()
-        for _, answer in tasks:
+        for _, answer in begun:
             if isinstance(answer, BaseException):  # a canceled task provides the reason
                 raise RunError(_lost(client, answer))
-            seconds, given = answer
-            size = max(1, round(_TASK * len(given) / seconds))
+            given = tasks.measured(answer)
             submit()
             yield from given
     except distributed.KilledWorker as error:
@@ -238,6 +271,7 @@ def _lost(client: Any, error: BaseException) -> str:
 
 # --- Choice of the executor
 
+_POOLED = 0.2  # s: target duration of a task in a pool; a killed study loses its tasks
 # Chunks in one batch on a graphics processor: 4,096 cases, which for hard braking need 2 GB of this
 # machine's memory for stimuli and rows.
 _TOGETHER = 64
@@ -251,16 +285,16 @@ class _InPool:
     """Computation of chunks, and other tasks, in the processes of a pool."""
 
     pool: ProcessPoolExecutor
-    ahead: int
+    workers: int
     together: int
 
     def __call__(self, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
+        ahead = _AHEAD * self.workers
         if self.together == 1:
-            begun = as_completed(self.pool, _computed, chunks, self.ahead)
-            return (computed for _, computed in begun)
-        batches = as_completed(
-            self.pool, _computed_together, batched(chunks, self.together), self.ahead
-        )
+            tasks = _Tasks(chunks, self.workers, _POOLED, _MOST)
+            begun = as_completed(self.pool, _computed, (tuple(task) for task in tasks), ahead)
+            return (computed for _, task in begun for computed in tasks.measured(task))
+        batches = as_completed(self.pool, _computed_together, batched(chunks, self.together), ahead)
         return (computed for _, batch in batches for computed in batch)
 
     def beside(self, job: Callable[[], T]) -> Beside[T]:
@@ -280,8 +314,13 @@ class InProcess:
         self.together = together
 
     def _computed(self, plan: StudyPlan, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
-        for several in batched(chunks, self.together):
-            yield from computed_chunks(plan, several)
+        if self.together > 1:
+            for several in batched(chunks, self.together):
+                yield from computed_chunks(plan, several)
+            return
+        tasks = _Tasks(chunks, 1, _POOLED, _MOST)
+        for task in tasks:
+            yield from tasks.measured(_timed(task, plan, threads=None))
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
@@ -309,7 +348,7 @@ class Pool:
         """Return the computation; see `Executor`."""
         fewer = f"resume it with fewer {option('workers')}"
         with processes_with_brakes(self.workers, fewer, _give, plan) as pool:
-            yield _InPool(pool, _AHEAD * self.workers, self.together)
+            yield _InPool(pool, self.workers, self.together)
 
 
 def executor_of(
@@ -388,8 +427,8 @@ def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
     return value, [each.message for each in caught if isinstance(each.message, Warning)]
 
 
-def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
-    return single(chunk, _given[0])
+def _computed(chunks: Sequence[int | PlacedChunk]) -> _Task:
+    return _timed(chunks, _given[0])
 
 
 def _computed_together(chunks: Sequence[int | PlacedChunk]) -> list[tuple[int, Columns]]:

@@ -42,14 +42,28 @@ def _text(value: Any) -> str:
     return ", ".join(map(_text, value)) if isinstance(value, list) else str(value)
 
 
-def there(subject: str, folder: Path) -> str:
-    """Return the path of a file beside the sign-off file, or a name unchanged."""
-    path = folder / subject
+def there(subject: str, argument: Argument | None, folder: Path) -> str:
+    """Return the path of a file relative to the sign-off file, or a name unchanged.
+
+    Parameters
+    ----------
+    subject
+        A file or a name.
+    argument
+        Argument of the use case, which may accept files only or names only; None for a file.
+    folder
+        Folder of the sign-off file.
+    """
+    if argument is not None and not (argument.is_path or argument.ask.files):
+        return subject
+    is_name = argument is not None and bool(argument.ask.known)
+    ending = "" if argument is None else argument.ask.files
     try:
-        is_file = path.exists() or Path(subject).suffix != "" or "/" in subject
+        is_file = not is_name or (folder / subject).is_file()
     except (OSError, ValueError):  # too long, or with a null character
         return subject
-    return str(path) if is_file else subject
+    is_file = is_file or "/" in subject or bool(ending and subject.endswith(ending))
+    return str(folder / subject) if is_file else subject
 
 
 def value_of(argument: Argument, value: Any, folder: Path) -> Any:
@@ -87,7 +101,7 @@ def value_of(argument: Argument, value: Any, folder: Path) -> Any:
         return texts if kind == "lines" else changes(texts, name)
     if not isinstance(value, str):
         raise not_valid(name, quoted(value), "a text in quotes")
-    return there(value, folder) if argument.is_path or argument.ask.offered else value
+    return there(value, argument, folder)
 
 
 def read_figure_limit(
@@ -115,10 +129,7 @@ def read_figure_limit(
     if figure not in figures:
         raise unknown_name("key figure in limit", figure, figures)
     limit = text[text.index(figure) + len(figure) :].strip()
-    unit = figures[figure]
-    if unit == "1" and "%" in limit.partition(" with ")[0]:
-        unit = "%"
-    return read_limit(figure, limit, unit, "limit", has_probability=has_probability)
+    return read_limit(figure, limit, figures[figure], "limit", has_probability=has_probability)
 
 
 def require_file(path: Any) -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+from bywire.analysis.loop import LOOPS
 from bywire.api.life import LIFE_FIGURES
 from bywire.api.loop_case import LoopCase
 from bywire.api.replay import driven_bench
@@ -24,6 +25,7 @@ from bywire.core.typing import Progress
 from bywire.core.version import __version__
 from bywire.identification.replay_fit import read_tolerances
 from bywire.life.life_file import LifePlan
+from bywire.procedures.procedure_file import ProcedurePlan
 from bywire.report.bench_figures import FIGURES
 from bywire.signoff.plan import Computed, Task
 from bywire.synthesis.linear_case import read as read_loop_limits
@@ -88,9 +90,14 @@ class Kind:
         return use_cases()[self.use_case]
 
     @property
+    def subject_argument(self) -> Argument:
+        """The argument that the key in the file specifies."""
+        return next(a for a in self.case.arguments if a.argument == self.subject)
+
+    @property
     def key(self) -> str:
         """Name of the subject among the use case's fields."""
-        return next(a.name for a in self.case.arguments if a.argument == self.subject)
+        return self.subject_argument.name
 
     @cached_property
     def arguments(self) -> dict[str, Argument]:
@@ -130,11 +137,16 @@ def _read_loop(asked: Asked) -> LoopCase:
 def _loop_identity(case: LoopCase) -> Identity:
     return {
         "loop": case.loop.name,
-        "computed": functions_digest([case.loop], "bywire.analysis", with_equations=True),
+        "computed": _loop_digest(case.loop.name),
         "parameters": case.par.flat(),
         "at": case.value,
         "side": case.loop.side,
     }
+
+
+@cache
+def _loop_digest(name: str) -> str:
+    return functions_digest([LOOPS.find(name)], "bywire.analysis", with_equations=True)
 
 
 def _loop_limit(case: LoopCase, text: str) -> Limit:
@@ -172,6 +184,15 @@ def _life_identity(plan: LifePlan) -> Identity:
 def _life_limit(plan: LifePlan, text: str) -> Limit:
     del plan
     return read_figure_limit(text, {name: unit for name, (unit, _) in LIFE_FIGURES.items()})
+
+
+def _read_procedure(asked: Asked) -> ProcedurePlan:
+    plan: ProcedurePlan = use_cases()["run_procedure"].read(asked)
+    return plan
+
+
+def _procedure_limit(plan: ProcedurePlan, text: str) -> Limit:
+    return read_figure_limit(text, plan.units)
 
 
 def _read_contracts(asked: Asked) -> str:
@@ -225,6 +246,14 @@ KINDS: Mapping[str, Kind] = {
     ),
     "life": Kind(
         "project_life", "source", _read_life, _life_identity, _life_limit, resolved=("set",)
+    ),
+    "procedure": Kind(
+        "run_procedure",
+        "procedure",
+        _read_procedure,
+        lambda plan: plan.identity,
+        _procedure_limit,
+        resolved=("set",),
     ),
     "contracts": Kind(
         "check", "name", _read_contracts, lambda name: {"of": name}, is_by_source=True
@@ -346,7 +375,7 @@ def read_kind(kind: str, subject: str, arguments: Mapping[str, Any], folder: Pat
         if name not in chosen.arguments:
             raise unknown_of_few(f"key of [[evidence]] {kind}", name, (*chosen.arguments, *_OTHERS))
     asked = {name: value_of(chosen.arguments[name], v, folder) for name, v in arguments.items()}
-    asked[chosen.key] = there(subject, folder)
+    asked[chosen.key] = there(subject, chosen.subject_argument, folder)
     return UseCaseTask(kind, subject, arguments, folder, asked, chosen.read(asked))
 
 

@@ -19,6 +19,7 @@ from bywire.signoff.plan import Computed, Task
 from bywire.studies.designs import MOST
 from bywire.studies.findings import Judgment
 from bywire.studies.plan import StudyPlan
+from bywire.studies.stated_error import with_step
 from bywire.studies.store import Origin as StudyOrigin
 from bywire.studies.store import StudyStore
 from bywire.studies.study_file import read_study
@@ -124,7 +125,8 @@ class StudyTask(Task):
 
     def compute(self, folder: Path, progress: Progress) -> Computed:
         """Compute the result, and write its report."""
-        plan, store = self.judged_plan, StudyStore(folder)
+        store = StudyStore(folder)
+        plan = with_step(self.judged_plan, store, progress)
         run = completed(StudyOrigin(self.file, self.changes), plan, store, None, "", progress)
         run.write(folder)
         return Computed(run, {str(j.demand): _judged(run, j) for j in run.findings.judgments})
@@ -168,10 +170,11 @@ def _judged(run: StudyRun, judgment: Judgment) -> Judged:
 
 
 def _worst(run: StudyRun, judgment: Judgment) -> float:
-    figures = run.findings.figure(judgment.demand.figure)
-    if judgment.worst is not None:
-        return float(figures[judgment.worst])
-    return float(figures[0]) if figures.size else math.nan
+    """Return the key figure of the worst case; of any case if all are equal."""
+    if not run.findings.count:
+        return math.nan
+    row = 0 if judgment.worst is None else judgment.worst
+    return float(run.findings.row(row)[judgment.demand.figure])
 
 
 def read_study_task(subject: str, arguments: Mapping[str, Any], folder: Path) -> StudyTask:
@@ -183,7 +186,7 @@ def read_study_task(subject: str, arguments: Mapping[str, Any], folder: Path) ->
                 "key of [[evidence]] study", name, (*KEYS, "shows", "limit", "note")
             )
     asked = {name: value_of(known[name], value, folder) for name, value in arguments.items()}
-    file = Path(there(subject, folder))
+    file = Path(there(subject, None, folder))
     require_file(file)
     changes = asked.get("set", {})
     plan = read_study(file, changes)
