@@ -15,10 +15,9 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench import running
@@ -34,6 +33,9 @@ from bywire.core.errors import BywireError, DeviceError, InputError, RunError, S
 from bywire.core.typing import Array, Progress
 from bywire.core.units import shown
 from bywire.simulation.run_table import doubts_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _PERCENT = 100.0
 _COUNTS = sorted(2**a * 5**b for a in range(1, 24) for b in range(10))
