@@ -126,22 +126,20 @@ def exceeded(result: Result) -> str:
     if bench.choice is None or not result.recordings:
         return ""
     scales, intervals = scales_of(bench, result.recordings), _intervals(bench)
-    errors = {}
+    texts = []
     for kpi in result.kpis:
         scale = max(abs(kpi.value), scales.full.get(kpi.name, 0.0))
-        if kpi.name in (bench.limits or [kpi.name]) and scale > 0.0 and not math.isnan(kpi.error):
-            read = reading_error(kpi.value, intervals) if kpi.unit == "s" else 0.0
-            factor = 1.0 if kpi.converges else BOUND
-            errors[kpi.name] = factor * max(kpi.error - read, 0.0) / scale
-    return _exceeded(bench.choice.stated, errors)
-
-
-def _exceeded(stated: float, errors: Mapping[str, float]) -> str:
-    large = [name for name, error in errors.items() if error > stated]
-    if not large:
+        if kpi.name not in (bench.limits or [kpi.name]) or not scale > 0.0:
+            continue
+        beside = scales.rounding.get(kpi.unit, 0.0)
+        beside += reading_error(kpi.value, intervals) if kpi.unit == "s" else 0.0
+        error = (1.0 if kpi.converges else BOUND) * max(kpi.error - beside, 0.0) / scale
+        if error > bench.choice.stated * (1.0 + error):  # the choice also scales with other steps
+            texts.append(f"{kpi.name} {percent_text(error)}")
+    if not texts:
         return ""
-    texts = ", ".join(f"{name} {percent_text(errors[name])}" for name in large)
-    return f"numerical errors exceed simulation.error = {error_text(stated)}: {texts}"
+    stated = error_text(bench.choice.stated)
+    return f"numerical errors exceed simulation.error = {stated}: {', '.join(texts)}"
 
 
 def percent_text(error: float) -> str:
@@ -390,7 +388,7 @@ class _Trials:
         """
         trial = self.at(step)
         errors = trial.errors
-        if trial.doubt or errors.reached > stated or _HALF * step < FINEST:
+        if trial.doubt or errors.reached > stated:
             return trial
         half = self.at(_HALF * step).errors
         if not half.each:
