@@ -74,10 +74,12 @@ NEWEST_TESTS = [
         "simulation/test_run_outcomes.py",
         "analysis/test_margins.py",
         "life/test_life_file.py",
+        "procedures/test_formula.py",
         "plant/test_adhesion.py",
         "vehicle",
         "reproduction/test_item.py",
         "api/test_api_run_report.py",
+        "signoff/test_verdicts.py",
         "usecases/test_declared.py",
     )
 ]

@@ -23,6 +23,8 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 
 WIDTH = 3e-4
 TOLERANCE = 1e-3
+SETTINGS = ((WIDTH, 2e-3), (WIDTH, TOLERANCE))
+"""widths and tolerances that the benchmark compares"""
 FIRST_STEP = 1e-5
 
 

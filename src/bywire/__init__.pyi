@@ -12,9 +12,11 @@ from bywire.api.identification import Identification as Identification
 from bywire.api.life import LifeResult as LifeResult
 from bywire.api.new import NewBrake as NewBrake
 from bywire.api.overview import overview as overview
+from bywire.api.procedure import ProcedureResult as ProcedureResult
 from bywire.api.replay import Replay as Replay
 from bywire.api.run import BenchResult as BenchResult
 from bywire.api.run_over import BenchRange as BenchRange
+from bywire.api.signoff import SignOff as SignOff
 from bywire.api.study_run import StudyRun as StudyRun
 from bywire.api.trust import TrustStudy as TrustStudy
 from bywire.api.trust import trust as trust
@@ -55,11 +57,13 @@ from bywire.usecases.loops import frequency_response as frequency_response
 from bywire.usecases.loops import linearize as linearize
 from bywire.usecases.loops import margins as margins
 from bywire.usecases.new import new as new
+from bywire.usecases.procedure import run_procedure as run_procedure
 from bywire.usecases.project_life import project_life as project_life
 from bywire.usecases.replay import replay as replay
 from bywire.usecases.reproduce import reproduce as reproduce
 from bywire.usecases.run import run as run
 from bywire.usecases.run_faults import run_faults as run_faults
+from bywire.usecases.sign_off import sign_off as sign_off
 from bywire.usecases.study import resume_study as resume_study
 from bywire.usecases.study import run_study as run_study
 from bywire.usecases.study import study as study

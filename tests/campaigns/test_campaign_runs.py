@@ -26,7 +26,7 @@ from bywire.campaigns.residual import (
 )
 from bywire.campaigns.running import CampaignFindings, CampaignStore, FaultFinding, finding
 from bywire.core.errors import DeviceError, FileError, InputError
-from bywire.simulation.cuda import find_device
+from bywire.simulation.cuda_device import find_device
 
 SMALL = """
 bench = "hard-braking"

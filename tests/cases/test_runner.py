@@ -48,6 +48,15 @@ def test_an_interrupt_leaves_what_is_finished(workers: int) -> None:
     assert len(kept) == 3
 
 
+def test_pieces_that_are_finished_come_before_one_that_failed() -> None:
+    with thread_pool(1) as pool:
+        computed = as_completed(pool, lambda k: 1 // k, [0, 1, 2])
+        pool.submit(int).result()  # after all of them
+        assert {next(computed), next(computed)} == {(1, 1), (2, 0)}
+        with pytest.raises(ZeroDivisionError):
+            next(computed)
+
+
 def test_nothing_is_started_where_nothing_is_missing() -> None:
     done = complete([1], {1: 2}, float, keep=pytest.fail, progress=pytest.fail, pool=pytest.fail)
     assert done == {1: 2}

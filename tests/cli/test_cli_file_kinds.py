@@ -11,12 +11,14 @@ FILES = {
     "bench": BRAKING,
     "study": 'bench = "hard-braking"\n[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 64\n',
     "life": 'life = "wedge-pads"\n',
+    "procedure": 'procedure = "A stop"\nexperiment = "straight-stop"\n',
     "campaign": 'bench = "hard-braking"\n[vary]\n"motor.R_m" = "+-5 %"\n[[criteria]]\n',
 }
 COMMANDS = {
     "bench": ("run",),
     "study": ("study", "run"),
     "life": ("life",),
+    "procedure": ("procedure",),
     "campaign": ("faults",),
 }
 WORDS = {kind: f"a {kind}" for kind in FILES} | {"campaign": "a fault campaign"}

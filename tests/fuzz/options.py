@@ -30,6 +30,7 @@ COMMANDS: dict[str, list[str]] = {
     "agreement": ["current", "--frequencies", "100 Hz, 200 Hz"],
     "margins": ["pressure"],
     "life": ["life.toml"],
+    "procedure": ["procedure.toml"],
     "faults": ["campaign.toml"],
     "design": ["current"],
     "convert": ["measured.csv", "made.csv", "--force"],
@@ -59,6 +60,7 @@ _KEYS = (
     "options.duration",
     "options.settle",
     "simulation.step",
+    "simulation.error",
     "simulation.record",
     "motor.R_m",
     "simulation.seed",
@@ -129,6 +131,7 @@ def prepared(folder: Path) -> Path:
     only = '[campaign]\nonly = ["pressure.stuck"]\n'
     (folder / "campaign.toml").write_text(head + only + _CRITERION)
     (folder / "life.toml").write_text('life = "none"\n')
+    (folder / "procedure.toml").write_text('procedure = "none"\n')
     return folder
 
 

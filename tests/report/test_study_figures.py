@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -19,11 +20,17 @@ from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.readable_axis import few_labels
 from bywire.report.study.cases import CaseAxis, choice_axis, parallel_coordinates, scatter
-from bywire.report.study.drawn_cases import LINES, DrawnCases, drawn_cases
+from bywire.report.study.drawn_cases import LINES, CaseSelection, DrawnCases
 from bywire.report.study.influences import tornado
-from bywire.report.study.probabilities import Curve, Spread, convergence, exceedance, histograms
+from bywire.report.study.probabilities import (
+    Curve,
+    Histogram,
+    convergence,
+    exceedance,
+    histograms,
+)
 from bywire.studies.findings import Effect
-from bywire.studies.statistics import running_share
+from bywire.studies.statistics import Share, bin_count, bin_edges, running_sizes, share
 
 RNG = np.random.default_rng(1)
 CASES = 200
@@ -70,8 +77,44 @@ def entries(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
+def drawn_cases(
+    met: NDArray[np.bool_],
+    most_met: int,
+    most_missed: int = CASES,
+    known: NDArray[np.bool_] | None = None,
+) -> DrawnCases:
+    """Return a selection from blocks, whose columns are all cases in order if all are drawn."""
+    shown = np.ones(met.size, dtype=bool) if known is None else known
+    masks = met & shown, ~met & shown, ~shown
+    all_met, all_missed, all_lacking = (int(np.sum(mask)) for mask in masks)
+    selection = CaseSelection(all_met, all_missed, most_met, most_missed, all_lacking)
+    for block in np.array_split(np.arange(met.size), 3):
+        selection.add({}, met[block], shown[block])
+    cases = selection.cases
+    return replace(
+        cases,
+        met=cases.rows[cases.met],
+        missed=cases.rows[cases.missed],
+        lacking=cases.rows[cases.lacking],
+    )
+
+
 def every(met: NDArray[np.bool_]) -> DrawnCases:
-    return drawn_cases(met, met.size)
+    return drawn_cases(met, met.size, met.size)
+
+
+def histogram(values: Array, unit: str, nominal: float, limit: float | None = None) -> Histogram:
+    ends = float(values.min()), float(values.max())
+    edges = bin_edges(*ends, bin_count(values))
+    band = (float(x) for x in np.quantile(values, (0.05, 0.95)))
+    return Histogram(
+        np.histogram(values, edges)[0], edges, ends, (next(band), next(band)), unit, nominal, limit
+    )
+
+
+def running_share(met: NDArray[np.bool_]) -> list[Share]:
+    sizes = running_sizes(met.size, 100).tolist()
+    return [share(int(met[:n].sum()), n, 0.95) for n in sizes]
 
 
 def texts(axes: Axes) -> list[str]:
@@ -95,7 +138,7 @@ def test_labels_of_a_histogram_never_touch(middle: float, spread: float, unit: s
         drawn(
             histograms(
                 {
-                    name: Spread(values, unit, middle)
+                    name: histogram(values, unit, middle)
                     for name in ("share_sat_current", "share_sat_duty")
                 }
             )
@@ -104,7 +147,8 @@ def test_labels_of_a_histogram_never_touch(middle: float, spread: float, unit: s
 
 
 def test_a_histogram_names_a_limit_that_lies_far_off() -> None:
-    far, near = Spread(ERROR.values, "Pa", 250.0, 1e4), Spread(ERROR.values, "Pa", 250.0, 600.0)
+    far = histogram(ERROR.values, "Pa", 250.0, 1e4)
+    near = histogram(ERROR.values, "Pa", 250.0, 600.0)
     figure = drawn(histograms({"far": far, "near": near}))
     assert figure.axes[0].get_title(loc="right") == "limit 0.1 bar →"
     assert texts(figure.axes[0]) == texts(figure.axes[1]) == []
@@ -175,7 +219,7 @@ def test_many_points_are_small_and_translucent() -> None:
 def test_a_convergence_shows_what_decides() -> None:
     met = np.ones(256, dtype=bool)
     met[[70, 130]] = False
-    shares = running_share(met, 0.95, 100)
+    shares = running_share(met)
     figure = drawn(convergence({"a": shares, "b": shares}, {"a": 0.99, "b": None}, first=64))
     assert entries(figure) == ["estimate", "interval", "required"]
     assert_readable(figure)
@@ -187,7 +231,7 @@ def test_a_convergence_shows_what_decides() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cases", "share", "wanted"),
+    ("cases", "part", "wanted"),
     [
         (1, 0.0, None),
         (1, 0.4, 0.5),
@@ -201,9 +245,9 @@ def test_a_convergence_shows_what_decides() -> None:
     ],
 )
 def test_a_convergence_holds_its_estimate_and_what_is_wanted(
-    cases: int, share: float, wanted: float | None
+    cases: int, part: float, wanted: float | None
 ) -> None:
-    shares = running_share(np.arange(cases) < share * cases, 0.95, 100)
+    shares = running_share(np.arange(cases) < part * cases)
     axes = convergence({"a": shares}, {"a": wanted}, first=64).axes[0]
     low, high = axes.get_ylim()
     last = shares[-1]
@@ -213,7 +257,7 @@ def test_a_convergence_holds_its_estimate_and_what_is_wanted(
 
 def test_the_outline_of_a_histogram_holds_all_cases() -> None:
     values = RNG.normal(size=CASES)
-    axes = histograms({"overshoot": Spread(values, "%", 0.0)}, has_band=False).axes[0]
+    axes = histograms({"overshoot": histogram(values, "%", 0.0)}, has_band=False).axes[0]
     (outline,) = (each for each in axes.patches if isinstance(each, Polygon))
     corners = outline.get_xy()
     widths, heights = np.diff(corners[:, 0]), corners[1:, 1]
@@ -361,7 +405,7 @@ def test_a_narrow_axis_has_two_labels_at_least(ends: tuple[float, float]) -> Non
 
 def test_a_limit_far_off_crosses_no_line_of_a_histogram() -> None:
     own = float(np.max(ERROR.values))  # the value of the bench is at that end
-    axes = drawn(histograms({"far": Spread(ERROR.values, "Pa", own, 1e4)})).axes[0]
+    axes = drawn(histograms({"far": histogram(ERROR.values, "Pa", own, 1e4)})).axes[0]
     title = axes._right_title  # matplotlib returns only its text
     assert title.get_text() == "limit 0.1 bar →"
     assert not title.get_window_extent().overlaps(axes.get_window_extent())

@@ -1,8 +1,9 @@
 /* A driver's library, libcuda.so.1, that NVIDIA's bindings load and call: its memory is this
- * machine's, and its kernel the library of EMULATED_KERNEL. */
+ * machine's, and its kernels the libraries in the folder EMULATED_KERNELS, by their names. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,6 +26,15 @@ static int fake_cuDevicePrimaryCtxRetain(void **given, int device) {
   *given = context;
   return device;
 }
+static int fake_cuDriverGetVersion(int *version) { *version = 12090; return 0; }
+static int fake_cuDevicePrimaryCtxSetFlags(int device, unsigned flags) {
+  return flags == 4 ? device : INVALID_VALUE;
+}
+static int fake_cuMemHostAlloc(void **place, size_t size, unsigned flags) {
+  *place = malloc(size);
+  return flags ? INVALID_VALUE : 0;
+}
+static int fake_cuMemFreeHost(void *place) { free(place); return 0; }
 static int fake_cuCtxSetCurrent(void *given) { return given == context ? 0 : INVALID_CONTEXT; }
 static int fake_cuCtxSynchronize(void) { return 0; }
 static int fake_cuMemGetInfo(size_t *free, size_t *total) { *free = *total = ROOM; return 0; }
@@ -41,13 +51,27 @@ static int fake_cuMemcpyDtoH(void *array, uint64_t place, size_t size) {
   memcpy(array, (void *)place, size);
   return 0;
 }
+/* CUDA_MEMCPY2D: source and destination, each x, y, kind, host, device, array, pitch. */
+struct place { size_t x, y; int kind; char *host; uint64_t device; void *array; size_t pitch; };
+struct lines { struct place from, to; size_t size, count; };
+static int fake_cuMemcpy2D(const struct lines *copied) {
+  const struct place *from = &copied->from, *to = &copied->to;
+  if (from->kind != 2 || to->kind != 1 || from->x || from->y || to->x || to->y)
+    return INVALID_VALUE;
+  for (size_t k = 0; k < copied->count; ++k)
+    memcpy(to->host + k * to->pitch, (char *)from->device + k * from->pitch, copied->size);
+  return 0;
+}
 static int fake_cuModuleLoadData(void **module, const void *image) {
   if (memcmp(image, "\177ELF", 4)) return INVALID_IMAGE;
-  *module = dlopen(getenv("EMULATED_KERNEL"), RTLD_NOW);
-  return *module ? 0 : INVALID_IMAGE;
+  *module = context;
+  return 0;
 }
 static int fake_cuModuleGetFunction(void **function, void *module, const char *name) {
-  *function = strcmp(name, "bw_run_cases") ? NULL : dlsym(module, "emulated");
+  char path[4096];
+  snprintf(path, sizeof(path), "%s/%s", getenv("EMULATED_KERNELS"), name);
+  void *const library = module == context ? dlopen(path, RTLD_NOW) : NULL;
+  *function = library ? dlsym(library, "emulated") : NULL;
   return *function ? 0 : NOT_FOUND;
 }
 static int fake_cuLaunchKernel(void *function, unsigned blocks, unsigned by, unsigned bz,
@@ -64,7 +88,8 @@ int cuGetProcAddress_v2(const char *asked, void **found, int version, uint64_t f
   HAS(cuInit) HAS(cuDeviceGetCount) HAS(cuDeviceGet) HAS(cuDeviceGetName)
   HAS(cuDeviceGetAttribute) HAS(cuDevicePrimaryCtxRetain) HAS(cuCtxSetCurrent)
   HAS(cuCtxSynchronize) HAS(cuMemGetInfo) HAS(cuMemAlloc) HAS(cuMemFree) HAS(cuMemcpyHtoD)
-  HAS(cuMemcpyDtoH) HAS(cuModuleLoadData) HAS(cuModuleGetFunction) HAS(cuLaunchKernel)
+  HAS(cuMemcpyDtoH) HAS(cuMemcpy2D) HAS(cuMemHostAlloc) HAS(cuMemFreeHost) HAS(cuDriverGetVersion)
+  HAS(cuDevicePrimaryCtxSetFlags) HAS(cuModuleLoadData) HAS(cuModuleGetFunction) HAS(cuLaunchKernel)
   if (status) *status = *found == NULL;
   (void)version;
   (void)flags;

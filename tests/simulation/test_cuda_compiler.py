@@ -7,8 +7,10 @@ import re
 import pytest
 
 from bywire.bench.bench_file import read
+from bywire.bench.kpis.families import FAMILIES
 from bywire.core.errors import CompilerError, DeviceError
-from bywire.simulation.cuda import ENTRY, cuda_binary, emit_cuda
+from bywire.simulation.cuda import ENTRY, EXTREMES, EXTREMES_ENTRY, emit_cuda
+from bywire.simulation.cuda_device import cuda_binary
 from bywire.simulation.engine import prepare
 from bywire.simulation.stages import build_stages
 from raising import raises
@@ -55,6 +57,17 @@ def test_a_processor_that_is_too_new_gets_what_its_driver_compiles(kernel):
     # Every operation says how it is rounded: the driver may fuse those alone that do not.
     assert len(re.findall(r"\bmul\.rn\.f64", text)) > 100
     assert not re.findall(r"\b(?:add|sub|mul)\.f64", text)
+
+
+@pytest.mark.parametrize("family", ["step_response", "vehicle_stop"])
+def test_key_figures_are_compiled_with_the_same_rounding(family):
+    loops = FAMILIES.find(family).loops
+    assert loops is not None
+    text = cuda_binary(loops.cuda_text, 999, loops.entry).decode()
+    assert f".visible .entry {loops.entry}(" in text
+    assert len(re.findall(r"\bmul\.rn\.f64", text)) > 10
+    assert not re.findall(r"\b(?:add|sub|mul)\.f64|\bfma\.", text)
+    assert cuda_binary(EXTREMES, 80, EXTREMES_ENTRY).startswith(b"\x7fELF")
 
 
 def test_a_processor_that_is_too_old_is_refused(kernel):

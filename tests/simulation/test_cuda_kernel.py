@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from bywire.bench.ensemble import simulate_ensemble as simulate_ensemble_of_benc
 from bywire.core.brake import load_system
 from bywire.core.errors import DeviceError, UnknownNameError
 from bywire.simulation import cuda
+from bywire.simulation.cuda_device import find_device
 from bywire.simulation.ensemble import Ensemble, simulate_ensemble, simulate_group
 from bywire.simulation.run import Run, simulate
 from emulated_driver import OK, EmulatedDriver, Status, emulated
@@ -85,7 +87,7 @@ def test_every_case_has_the_digits_that_it_has_in_lanes(experiment, driver, monk
 @pytest.mark.parametrize("experiment", BRAKES)
 def test_a_processor_that_is_there_agrees_with_this_machines(experiment):
     try:
-        device = cuda.find_device()
+        device = find_device()
     except DeviceError as error:
         pytest.skip(str(error))
     lanes, there = computed(experiment)
@@ -121,6 +123,7 @@ def test_an_ensemble_goes_there_in_batches(runs, driver, monkeypatch):
     monkeypatch.setattr(cuda, "MOST", 2)
     there = simulate_ensemble(runs[0], cases, signals, engine="cuda")
     assert len(driver.launches) == 3
+    assert driver.copies == 6  # of each batch's rows and states, into one array for all
     np.testing.assert_array_equal(there.values, lanes.values)
 
 
@@ -160,11 +163,23 @@ def test_memory_that_others_took_meanwhile_is_said(runs, driver, monkeypatch):
     assert not driver.places
 
 
-def test_a_processor_that_fails_is_said(runs, driver, monkeypatch):
-    status = Status.CUDA_ERROR_ILLEGAL_ADDRESS
-    monkeypatch.setattr(driver, "cuCtxSynchronize", lambda: (status,))
-    with pytest.raises(DeviceError, match=r"emulated 0 failed: .* why \(CUDA_ERROR_ILLEGAL"):
+@pytest.mark.parametrize(
+    ("function", "status", "said"),
+    [
+        ("cuCtxSynchronize", Status.CUDA_ERROR_ILLEGAL_ADDRESS, "failed: .* why .*_ILLEGAL_ADDR"),
+        ("cuCtxSynchronize", Status.CUDA_ERROR_LAUNCH_TIMEOUT, "too long .* with a display"),
+        ("cuLaunchKernel", Status.CUDA_ERROR_LAUNCH_FAILED, "failed: .* why .*_LAUNCH_FAILED"),
+        ("cuMemcpyHtoD", Status.CUDA_ERROR_UNKNOWN, r"failed: .* why \(CUDA_ERROR_UNKNOWN\)"),
+        ("cuMemcpyDtoH", Status.CUDA_ERROR_ECC_UNCORRECTABLE, "uncorrectable memory error"),
+        ("cuMemFree", Status.CUDA_ERROR_UNKNOWN, "failed: .* why"),
+        ("cuCtxSetCurrent", Status.CUDA_ERROR_INVALID_CONTEXT, "failed: .* why"),
+    ],
+)
+def test_a_processor_that_fails_is_said(function, status, said, runs, driver, monkeypatch):
+    monkeypatch.setattr(driver, function, lambda *_: (status,))
+    with raises(DeviceError, name="emulated 0", value=status.name) as caught:
         simulate_group(runs, engine="cuda")
+    assert re.search(said, str(caught.value))
 
 
 def test_an_engine_that_is_none_is_refused(runs):

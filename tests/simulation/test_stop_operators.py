@@ -10,7 +10,7 @@ import pytest
 from bywire.core.errors import DeviceError, ModelError
 from bywire.core.signals import zeros
 from bywire.simulation.advance import Change
-from bywire.simulation.cuda import find_device
+from bywire.simulation.cuda_device import find_device
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.program import build_program
 from bywire.simulation.run import Run, Trajectory, simulate

@@ -16,6 +16,7 @@ from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.studies.findings import Findings, choice_influence
 from bywire.studies.store import CASE, FAILURE, WARNINGS
 from bywire.studies.study_file import read_study
+from bywire.studies.survey import Reason
 from raising import raises
 
 
@@ -55,9 +56,10 @@ def test_cases_closer_to_the_limit_than_their_error_decide_nothing(
 def test_a_case_without_a_result_misses_and_the_worst_is_named(found):
     findings = found([19.0, math.nan, 21.0, 19.5])
     (judgment,) = findings.judgments
-    assert judgment.met.tolist() == [True, False, False, True]
     assert (judgment.share.count, judgment.worst) == (2, 2)
-    assert findings.failures == {1: "it left the numbers"}
+    assert (judgment.known, judgment.known_met, judgment.lacking) == (3, 2, 0)
+    assert findings.reasons == (Reason("it left the numbers", 1, 1),)
+    assert [findings.has_result(row) for row in range(4)] == [True, False, True, True]
     assert findings.warnings == {"far out; cold": 4, "hot: 20 degC, and so on": 4}
     assert [s.undefined for s in findings.spreads] == [1]
     assert findings.values(2) == {"motor.R_m": pytest.approx(0.3 + 0.2 / 3)}

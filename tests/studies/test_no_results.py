@@ -34,7 +34,7 @@ def test_a_study_without_any_result_says_why_and_fails(study, tmp_path, design, 
     path = study(f"{VARY}{design}\n{requirements}", bench=BENCH)
     run = bywire.run_study(path, tmp_path / "out")
     assert (run.status, run.holds) == ("failed", False)
-    assert len(run.findings.failures) == len(run.cases) > 0
+    assert run.findings.failed == len(run.cases) > 0
     assert any("cases have no result" in text for text in run.warnings)
     assert "must be < the chamber length" in " ".join(str(run).split())
     names = {each.name for each in run.write(tmp_path / "report")}
@@ -56,7 +56,7 @@ def test_key_figures_that_no_case_has_are_no_result(tmp_path):
     )
     with pytest.warns(match="no key figure is defined in any case"):
         run = bywire.run_study(path, tmp_path / "out")
-    assert (run.status, run.findings.failures) == ("failed", {})
+    assert (run.status, run.findings.failed) == ("failed", 0)
     assert run.write(tmp_path / "report")
 
 

@@ -82,7 +82,8 @@ def test_what_drives_missed_requirements_comes_first(study):
     rng = np.random.default_rng(1)
     names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
     columns = {each: rng.uniform(0.5, 0.9, 128) for each in (*names, *QUANTITIES)}
-    columns |= {CASE: np.arange(128), "overshoot": rng.uniform(0.5, 1.5, 128), FAILURE: ""}
+    columns |= {CASE: np.arange(128), "overshoot": rng.uniform(0.5, 1.5, 128)}
+    columns |= {FAILURE: "", WARNINGS: ""}
     findings = Findings(plan, pd.DataFrame(columns), ())
     outcomes = {each.demand.figure: each.outcome for each in findings.judgments}
     assert outcomes == {"dead_time": "met", "rise_time": "undecided", "overshoot": "missed"}

@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.analysis.loop import Loop
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.sweep import Sweep
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array, Complex, Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _PATIENCE = 12  # maximum number of windows for loops with friction, which may never repeat exactly
 GAIN, PHASE = 0.01, 0.1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bywire.contracts.evidence import Finding
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, Outcome, outcome_of
 from bywire.report.document import Banner, Document, Flat, Listing, Section, TableBlock
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
@@ -47,6 +47,12 @@ class Check(Answer):
     def not_checked(self) -> tuple[Finding, ...]:
         """Findings of contracts that could not be checked, each with the reason."""
         return self._with("not checked")
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the contracts; ``undecided`` if some could not be checked."""
+        words: dict[str, Outcome] = {"holds": "met", "broken": "missed"}
+        return outcome_of([words.get(each.outcome, "undecided") for each in self.findings])
 
     def _with(self, outcome: str) -> tuple[Finding, ...]:
         return tuple(f for f in self.findings if f.outcome == outcome)

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
-import xarray as xr
 
 from bywire.api.run import bench_of
 from bywire.bench import running
@@ -25,6 +24,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import is_result_folder, read_result, verdict_record
 from bywire.bench.running import Result
+from bywire.bench.step_choice import with_chosen_step
 from bywire.bench.step_error import are_distinct
 from bywire.bench.stimulus import STIMULI
 from bywire.core.callers import is_command_line
@@ -53,6 +53,7 @@ from bywire.report.terminal import change_texts
 from bywire.report.wording import amount, beside_limit, clean, measured_amount
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
     from bywire.report.step_response import StepLimits
@@ -764,6 +765,7 @@ def _resolved(
 def _run(bench: Bench, progress: Progress | None, estimate_error: bool) -> Result:
     name = bench.name or bench.experiment
     report = None if progress is None else partial(_reported, progress, name)
+    bench = with_chosen_step(bench, progress=report)
     return running.run(bench, report, estimate_error=estimate_error)
 
 

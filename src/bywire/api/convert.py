@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import xarray as xr
-
 from bywire.core import units
 from bywire.core.callers import option
 from bywire.core.errors import not_valid
@@ -18,6 +16,8 @@ from bywire.report.tables import Cell, Table, text_table
 from bywire.report.wording import amount
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from bywire.data.channel_quality import AlignedChannel, AlignmentReport, Stretch
 
 _LISTED = 20

@@ -15,7 +15,7 @@ from bywire.core.catalog import Cited
 from bywire.core.errors import CompilerError, FileError, ModelError
 from bywire.core.scratch import made_folder
 from bywire.core.units import shown
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, Outcome
 from bywire.report.document import Document, Flat, Listing, Paragraph, Section, TableBlock
 from bywire.report.subject import bench_changes
 from bywire.report.tables import Cell, Column, Table, Verdict, text_table
@@ -270,6 +270,11 @@ class ControllerExport(Answer):
     def holds(self) -> bool:
         """Whether all processors in the check agree with Python."""
         return self.check is None or self.check.holds
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict of the check; ``not shown`` without one."""
+        return "not shown" if self.check is None else "met" if self.holds else "missed"
 
     @property
     def notes(self) -> list[str]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.margins import NO_LOOP
@@ -52,6 +51,7 @@ from bywire.report.tables import Table, amount_cell, measured_cell, text_table
 from bywire.report.wording import amount, measured_amount
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 

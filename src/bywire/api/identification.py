@@ -30,7 +30,7 @@ from bywire.identification.measured import Measured, measured, name_of, require_
 from bywire.identification.method import Effort, Identified
 from bywire.identification.question import BENCH_METHODS, BenchMethod, Question, find_method
 from bywire.identification.trust import displaced, put_in
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, Outcome, outcome_of
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -758,6 +758,11 @@ class Identification(Answer):
     def holds(self) -> bool:
         """Whether every check passed."""
         return not self.failures
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the checks; ``not shown`` if the method has none."""
+        return outcome_of(["met" if each.holds else "missed" for each in self.identified.checks])
 
     def bench_file(self) -> str:
         """Return a bench file with the identified parameters, headed by failed checks.

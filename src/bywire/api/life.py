@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from bywire.api.run_sections import choice_data, choice_texts
+from bywire.bench.kpis.kpi import Kpi
 from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit
 from bywire.life.life_file import CONDITION, CONDITIONS, WEAR, LifePlan
 from bywire.life.projection import CONFIDENCE, Projection
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, FigureAt
 from bywire.report.document import (
     Banner,
     Change,
@@ -36,6 +38,8 @@ from bywire.report.tables import KpiRow, Table, amount_cell, kpi_table, paramete
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+LIFE_FIGURES: Mapping[str, tuple[str, str]] = {"stops": ("1", "Number of stops until end of life.")}
+"""unit and definition of the figures that requirements can limit, by name"""
 _MOST = 100_000  # maximum number of stops to simulate individually
 _PROJECTION = ("stops", "seed", "share", "tolerance", "longest")
 
@@ -54,6 +58,14 @@ class LifeResult(Answer):
 
     projection: Projection
     checked: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def key_figures(self) -> list[FigureAt]:
+        """Number of stops until the end of life, with the half-width of its interval."""
+        made = self.projection
+        note = "" if made.ended_by else f"no limit is reached within {made.stops} stops"
+        unit, definition = LIFE_FIGURES["stops"]
+        return [FigureAt(Kpi("stops", float(made.stops), unit, definition, note, made.error))]
 
     @property
     def warnings(self) -> list[str]:
@@ -117,12 +129,15 @@ class LifeResult(Answer):
             sections=lambda: [
                 Section("Life", [*warned, kpis]),
                 Section("Slow states", [states, FigureBlock(self._drawn, _CAPTION, "life")]),
-                Section("Stops", [Listing(self._population()), wear]),
+                Section(
+                    "Stops",
+                    [Listing([*choice_texts(plan.bench), *self._population()]), wear],
+                ),
                 subject.provenance(),
             ],
             brief=[
                 f"life {plan.name}: {plan.life.summary}",
-                Listing(self._population()),
+                Listing([*choice_texts(plan.bench), *self._population()]),
                 "",
                 *spaced([kpis, states]),
             ],
@@ -234,6 +249,7 @@ class LifeResult(Answer):
             "left": {name: float(values[-1]) for name, values in made.left.items()},
             "steps": [{"first": each.first, "stops": each.count} for each in made.steps],
             "population": self._population(),
+            **choice_data(made.plan.bench),
             "warnings": self.warnings,
         }
 

@@ -21,8 +21,9 @@ from bywire.analysis.margins import (
 )
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase
+from bywire.bench.kpis.kpi import Kpi
 from bywire.core.parameters import ParameterSet
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, FigureAt, Outcome
 from bywire.report.document import (
     Banner,
     Block,
@@ -81,6 +82,30 @@ class Margins(Answer):
     def notes(self) -> list[str]:
         """Notes on the side of a kink that the linear models use."""
         return corner_notes(margins.corners for margins in self.margins)
+
+    @property
+    def key_figures(self) -> list[FigureAt]:
+        """The margins at every value. Unstable loops and loops without gain have none."""
+        values = self.values or (math.nan,)
+        return [
+            FigureAt(
+                Kpi(
+                    figure.name,
+                    getattr(margins, field) if margins.is_sound else math.nan,
+                    figure.unit,
+                    figure.meaning,
+                    "" if margins.is_sound else f"the loop is {margins.state}",
+                ),
+                f"{self.name} = {amount(value, self.unit)}" if self.name else "",
+            )
+            for value, margins in zip(values, self.margins, strict=True)
+            for field, figure in MARGINS.items()
+        ]
+
+    @property
+    def outcome(self) -> Outcome:
+        """``met`` if the loop is stable at every value."""
+        return "met" if all(margins.is_sound for margins in self.margins) else "missed"
 
     @cached_property
     def family(self) -> Family:

@@ -15,6 +15,7 @@ import xarray as xr
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.bench.experiment import without_step
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
@@ -32,7 +33,7 @@ from bywire.identification.replay_fit import (
     whole_record,
 )
 from bywire.identification.tracking import Track
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, Outcome, outcome_of
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -79,6 +80,11 @@ class Replay(Answer):
     def holds(self) -> bool:
         """Whether every tolerance is met."""
         return all(v.met for fit in self.fits for v in fit.verdicts)
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the tolerances; ``not shown`` without any."""
+        return outcome_of([v.outcome for fit in self.fits for v in fit.verdicts])
 
     @property
     def notes(self) -> list[str]:
@@ -369,6 +375,13 @@ def driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench
     InputError
         If the bench cannot be read, or a change is invalid.
     """
+    driven = _driven_bench(bench, changes)
+    if math.isnan(driven.step):
+        raise without_step("bywire chooses steps for the stimulus of a bench, not for measurements")
+    return driven
+
+
+def _driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench:
     if isinstance(bench, Bench):
         return bench.with_overrides(changes) if changes else bench
     try:

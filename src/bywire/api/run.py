@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bywire.api.run_sections import (
+    choice_data,
     energy,
     how_it_was_made,
     outcome,
@@ -24,11 +25,12 @@ from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
+from bywire.bench.step_choice import exceeded, with_chosen_step
 from bywire.core.arguments import require_kinds
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Progress
 from bywire.report.animation.scene import SCENES
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, FigureAt, Outcome, outcome_of
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -79,7 +81,7 @@ def require_scene(bench: Bench, over: str = "") -> None:
 def _playable(result: Result) -> list[str]:
     """Return the labels of runs that an animation can show."""
     place = SCENES.find(result.bench.definition.assembly).place
-    return [label for label, run in result.recordings.items() if place in run]
+    return [label for label, run in result.recorded.items() if place in run]
 
 
 def animations(result: Result) -> list[Attachment]:
@@ -134,9 +136,19 @@ class BenchResult(Result, Answer):
         return self.status not in ("failed", "undecided")
 
     @property
+    def key_figures(self) -> list[FigureAt]:
+        """The key figures of the bench."""
+        return [FigureAt(kpi) for kpi in self.kpis]
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the bench's requirements; ``not shown`` without any."""
+        return outcome_of([verdict.outcome for verdict in self.verdicts])
+
+    @property
     def warnings(self) -> list[str]:
         """Warnings about the bench and its runs."""
-        return [*self.bench.outdated, *super().warnings]
+        return [*self.bench.outdated, *super().warnings, *filter(None, [exceeded(self)])]
 
     @property
     def rows(self) -> list[KpiRow]:
@@ -203,7 +215,7 @@ class BenchResult(Result, Answer):
     def ledgers(self) -> dict[str, Ledger]:
         """Return the energy balances of every run from time zero on, by label."""
         ledgers = {}
-        for label, recording in self.recordings.items():
+        for label, recording in self.recorded.items():
             if "E_stored" not in recording or recording["E_stored"].dims != ("time",):
                 continue
             after = recording.sel(time=slice(-1e-9, None))
@@ -243,7 +255,7 @@ class BenchResult(Result, Answer):
             banner=self._banner(),
             attachments=[
                 recording_file(f"{label}.nc", recording)
-                for label, recording in self.recordings.items()
+                for label, recording in self.recorded.items()
             ]
             + self._animations(),
             record="result.json",
@@ -298,7 +310,7 @@ class BenchResult(Result, Answer):
                 for name, signal in recording.items()
                 if "step_error_rms" in signal.attrs
             }
-            for label, recording in self.recordings.items()
+            for label, recording in self.recorded.items()
         }
 
     def _banner(self) -> Banner:
@@ -333,6 +345,7 @@ class BenchResult(Result, Answer):
                 for label, books in self.ledgers().items()
             },
             "step_errors": self._step_errors(),
+            **choice_data(self.bench),
             "warnings": self.warnings,
         }
 
@@ -341,6 +354,7 @@ def run_once(
     bench: Bench, progress: Progress | None, engine: str, estimate_error: bool, animated: bool
 ) -> BenchResult:
     """Return the result of a bench (see `bywire.run`)."""
+    bench = with_chosen_step(bench, progress=progress, engine=engine)
     result = running.run(bench, progress, engine, estimate_error)
     return BenchResult(
         **{each.name: getattr(result, each.name) for each in fields(result)}, animated=animated
@@ -357,7 +371,7 @@ def bench_of(bench: Bench | str | Path, overrides: Mapping[str, str]) -> Bench:
     """
     if not isinstance(bench, Bench):
         return bench_file.read(bench, overrides)
-    return bench.with_overrides(overrides) if overrides else bench
+    return bench.with_overrides(overrides).without_choice() if overrides else bench
 
 
 def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
@@ -370,7 +384,7 @@ def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
     """
     if not faults:
         return bench
-    return replace(bench, faults=(*bench.faults, *map(from_text, faults)))
+    return replace(bench.without_choice(), faults=(*bench.faults, *map(from_text, faults)))
 
 
 def _remark(verdict: Verdict) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
-from bywire.api.run_sections import varied_texts
+from bywire.api.run_sections import choice_data, choice_texts, varied_texts
+from bywire.bench.kpis.kpi import Kpi
 from bywire.campaigns.residual import NEVER
 from bywire.campaigns.running import CampaignFindings, FaultFinding
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, FigureAt, Outcome
 from bywire.report.document import (
     Banner,
     Details,
@@ -31,6 +32,7 @@ from bywire.report.document import (
 from bywire.report.subject import Subject
 from bywire.report.tables import Cell, Column, Table, amount_cell, text_table
 from bywire.report.wording import amount, clean
+from bywire.studies.statistics import Share
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -142,6 +144,35 @@ class FaultCampaign(Answer):
         return f"<FaultCampaign {plan.name}: {len(plan.faults)} faults, {plan.total} runs>"
 
     @property
+    def key_figures(self) -> list[FigureAt]:
+        """Coverage and false alarms, and the times of each dangerous fault."""
+        findings = self.findings
+        alarms, coverage = findings.false_alarms, findings.coverage_of_cases
+        missed = sum(each.kind in _RANK[:2] for each in findings.faults)
+        figures = [
+            FigureAt(_of_share("coverage", findings.coverage, coverage)),
+            FigureAt(_of_share("false_alarms", alarms.value, alarms)),
+            FigureAt(
+                Kpi("missed_faults", float(missed), "1", CAMPAIGN_FIGURES["missed_faults"][1])
+            ),
+        ]
+        for fault in findings.faults:
+            if not fault.dangerous:
+                continue
+            seen = math.inf if np.isnan(fault.seen).any() else _latest(fault.seen)
+            for name, value in (("fault_tolerant_time", fault.tolerance), ("detection_time", seen)):
+                kpi = Kpi(name, value, *CAMPAIGN_FIGURES[name])
+                figures.append(FigureAt(kpi, f"fault {_name(fault)}"))
+        return figures
+
+    @property
+    def outcome(self) -> Outcome:
+        """``met`` if every dangerous fault is detected in time and the reaction does no harm."""
+        findings = self.findings
+        is_missed = any(each.kind in _RANK[:2] for each in findings.faults)
+        return "missed" if is_missed or findings.harm_of_reaction() else "met"
+
+    @property
     def warnings(self) -> list[str]:
         """Harm done by the reaction, and warnings of the fault-free run and the solver."""
         healthy = [] if self.nominal is None else self.nominal.warnings
@@ -168,6 +199,12 @@ class FaultCampaign(Answer):
             f"{cases.count} of {cases.cases} runs (95 % confidence interval: "
             f"{100 * cases.low:.3g} to {100 * cases.high:.3g} %)",
         ]
+        if plan.bench.choice is not None:
+            notes += [
+                *choice_texts(plan.bench),
+                "the stated error applies to the key figures of fault-free runs, not to the times "
+                "and effects of faults",
+            ]
         if not plan.varied:
             notes.append(
                 "nothing varies, so thresholds come from a single fault-free run. Add a [vary] "
@@ -400,8 +437,28 @@ class FaultCampaign(Answer):
             "thresholds": dict(findings.healthy.thresholds),
             "faults": [record_data(each, self._quantities.values()) for each in findings.faults],
             "warnings": self.warnings,
+            **choice_data(findings.plan.bench),
             "notes": self.notes,
         }
+
+
+CAMPAIGN_FIGURES: Mapping[str, tuple[str, str]] = {
+    "coverage": ("1", "Fraction of dangerous runs that a monitor detects in time."),
+    "false_alarms": ("1", "Fraction of fault-free runs with an alarm."),
+    "missed_faults": ("1", "Number of dangerous faults that are detected too late or not at all."),
+    "fault_tolerant_time": ("s", "Time from a fault's onset until it violates a criterion."),
+    "detection_time": ("s", "Time from a fault's onset until a monitor detects it."),
+}
+"""unit and definition of the figures that requirements can limit, by name"""
+
+
+def _of_share(name: str, value: float, counted: Share) -> Kpi:
+    """Return a fraction of runs with half of its confidence interval as its error."""
+    if math.isnan(value):
+        note = "no fault is dangerous in this maneuver"
+        return Kpi(name, value, *CAMPAIGN_FIGURES[name], note, is_open=True)
+    error = max(counted.high - value, value - counted.low)
+    return Kpi(name, value, *CAMPAIGN_FIGURES[name], error=error)
 
 
 def _sentences(texts: Sequence[str]) -> str:

@@ -12,17 +12,18 @@ import numpy as np
 import xarray as xr
 
 from bywire.api.loop_case import spread
-from bywire.api.run_sections import fault_texts
+from bywire.api.run_sections import choice_data, choice_texts, fault_texts
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, run_benches, varied_leaf
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
+from bywire.bench.step_choice import exceeded, spread_over, with_chosen_step
 from bywire.bench.step_error import are_distinct
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array, Progress
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, FigureAt, Outcome, outcome_of
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -71,13 +72,27 @@ class BenchRange(Answer):
         return all(v.met for result in self.results for v in result.verdicts)
 
     @property
+    def key_figures(self) -> list[FigureAt]:
+        """The key figures at every value of the range."""
+        return [
+            FigureAt(kpi, f"{self.name} = {amount(value, self.unit)}")
+            for value, result in zip(self.values, self.results, strict=True)
+            for kpi in result.kpis
+        ]
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the bench's requirements at every value; ``not shown`` without any."""
+        return outcome_of([v.outcome for result in self.results for v in result.verdicts])
+
+    @property
     def warnings(self) -> list[str]:
         """Warnings of the runs, with their values."""
         warned: dict[str, list[float]] = {}
         for value, result in zip(self.values, self.results, strict=True):
-            for text in (*result.bench.outdated, *result.warnings):
+            for text in (*result.bench.outdated, *result.warnings, exceeded(result)):
                 warned.setdefault(text, []).append(value)
-        return [f"{text} ({self._at(values)})" for text, values in warned.items()]
+        return [f"{text} ({self._at(values)})" for text, values in warned.items() if text]
 
     def kpi(self, name: str) -> Array:
         """Return a key figure for every value, shape (values,), NaN where it is not defined.
@@ -114,7 +129,8 @@ class BenchRange(Answer):
         judged = list(self._judged())
         listing = [Listing([text for _, text in judged], "Requirements:")] if judged else []
         listing += [Listing(said)] if (said := self._indistinct()) else []
-        faults = [Listing(said)] if (said := fault_texts(bench)) else []
+        said = [*choice_texts(bench), *fault_texts(bench)]
+        faults = [Listing(said)] if said else []
         return Document(
             f"{title} over {self.name}",
             subject.line,
@@ -289,24 +305,18 @@ class BenchRange(Answer):
                 for value, result in zip(self.values, self.results, strict=True)
             ],
             "distinct": self._distinct,
+            **choice_data(self.bench),
             "warnings": self.warnings,
         }
 
 
-def run_over(
-    bench: Bench, over: str, progress: Progress | None, engine: str, estimate_error: bool
-) -> BenchRange:
-    """Return a bench's results for every value of ``NAME=LOW:HIGH:COUNT`` (see `bywire.run`).
+def range_of_bench(bench: Bench, over: str) -> tuple[str, str, list[float]]:
+    """Return name, SI unit and values of a range ``NAME=LOW:HIGH:COUNT`` for a bench.
 
     Raises
     ------
     InputError
-        If the range is invalid, the name is not a number of the bench or its options, or the bench
-        rejects a value.
-    RunError
-        If a run fails.
-    KeyboardInterrupt
-        If interrupted.
+        If the range is invalid, or the name is not a number of the bench or its options.
     """
     name, equals, text = (part.strip() for part in over.partition("="))
     if not equals:
@@ -324,9 +334,30 @@ def run_over(
         raise ParameterError(
             f"over {over!r} needs at least two different values", name="over", value=repr(over)
         )
-    benches = [changed(bench, {name: value}) for value in values]
+    return name, leaf.unit.symbol, values
+
+
+def run_over(
+    bench: Bench, over: str, progress: Progress | None, engine: str, estimate_error: bool
+) -> BenchRange:
+    """Return a bench's results for every value of ``NAME=LOW:HIGH:COUNT`` (see `bywire.run`).
+
+    Raises
+    ------
+    InputError
+        If the range is invalid, the name is not a number of the bench or its options, or the bench
+        rejects a value.
+    RunError
+        If a run fails.
+    KeyboardInterrupt
+        If interrupted.
+    """
+    name, unit, values = range_of_bench(bench, over)
+    cases = [{name: value} for value in values]
+    bench = with_chosen_step(bench, spread_over(cases), progress, engine)
+    benches = [changed(bench, case) for case in cases]
     results = run_benches(benches, progress, engine, estimate_error=estimate_error)
-    return BenchRange(bench, name, leaf.unit.symbol, tuple(values), results)
+    return BenchRange(bench, name, unit, tuple(values), results)
 
 
 def _cell(name: str, result: Result) -> Cell:

@@ -9,13 +9,14 @@ from typing import Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger
-from bywire.bench.experiment import Recordings
+from bywire.bench.experiment import Recordings, error_text
 from bywire.bench.kpis.families import FAMILIES
 from bywire.bench.running import Result
 from bywire.bench.stated import stated_for
+from bywire.bench.step_choice import percent_text
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
-from bywire.core.units import difference_unit
+from bywire.core.units import difference_unit, shown
 from bywire.report.document import Block, Details, Listing, Paragraph, Section, TableBlock
 from bywire.report.schematic import schematic_blocks
 from bywire.report.stated_levels import stated_level
@@ -49,8 +50,41 @@ def remarks(result: Result) -> list[str]:
     tenth, or misses its set point by more than a twentieth of the step. Faults and the model's own
     remarks are included.
     """
-    faults = fault_texts(result.bench, result.recordings)
-    return [*faults, *_shares(result), *_set_point(result), *_of_models(result)]
+    faults = fault_texts(result.bench, result.recorded)
+    return [
+        *choice_texts(result.bench),
+        *faults,
+        *_shares(result),
+        *_set_point(result),
+        *_of_models(result),
+    ]
+
+
+def choice_texts(bench: Bench) -> list[str]:
+    """Return a sentence about the step that bywire chose for a stated error, if it chose one."""
+    choice = bench.choice
+    if choice is None:
+        return []
+    of = f" of this bench and {choice.benches - 1} of its cases" * (choice.benches > 1)
+    reached = percent_text(choice.reached)
+    return [
+        f"step {shown(choice.step, 's', 'us')}, chosen for simulation.error = "
+        f"{error_text(choice.stated)} (largest estimated error{of}: {reached}, {choice.figure})"
+    ]
+
+
+def choice_data(bench: Bench) -> dict[str, Any]:
+    """Return the step that bywire chose for a stated error as JSON; empty if it chose none."""
+    choice = bench.choice
+    if choice is None:
+        return {}
+    about = {
+        "stated_error": choice.stated,
+        "estimated_error": choice.reached,
+        "figure": choice.figure,
+        "benches": choice.benches,
+    }
+    return {"step": {"value": choice.step, "unit": "s", **about}}
 
 
 def fault_texts(bench: Bench, recordings: Recordings | None = None) -> list[str]:
@@ -83,7 +117,7 @@ def _of_models(result: Result) -> list[str]:
     """
     texts: dict[str, None] = {}
     models = ASSEMBLIES.beside(type(result.bench.par))
-    for recording in result.recordings.values():
+    for recording in result.recorded.values():
         model = models.get(str(recording.attrs.get("model")))
         text = recording.attrs.get("parameters")
         if model is None or text is None or not recording.sizes.get("time"):
@@ -154,7 +188,7 @@ def source_says(result: Result) -> list[Block]:
         return []
     units = {
         name: str(signal.attrs.get("units", "1"))
-        for recording in result.recordings.values()
+        for recording in result.recorded.values()
         for name, signal in recording.data_vars.items()
     }
     rows = [
@@ -191,7 +225,7 @@ def how_it_was_made(
     ``errors`` are the numerical errors of all recorded signals, by run and name.
     """
     bench, cited = result.bench, PARAMETER_SETS.find(result.bench.parameters)
-    attrs = next(iter(result.recordings.values())).attrs if result.recordings else {}
+    attrs = next(iter(result.recorded.values())).attrs if result.recorded else {}
     kept = "; ".join(f"{key} {attrs[key]}" for key in _RECORDED if key in attrs)
     parameters = parameter_table(parameter_rows(bench.par, cited.values))
     return Section(
@@ -251,7 +285,7 @@ def tested_line(plan: StudyPlan) -> str:
 def tested_brief(nominal: Result, plan: StudyPlan) -> list[Block]:
     """Return faults and varied quantities for a terminal."""
     names = ", ".join(each.name for each in plan.varied)
-    faults = fault_texts(nominal.bench, nominal.recordings)
+    faults = [*choice_texts(nominal.bench), *fault_texts(nominal.bench, nominal.recorded)]
     listed = Listing([*faults, *([f"varied: {names}"] if names else [])])
     return [listed, Details("", [Listing(varied_texts(plan.varied))])]
 
@@ -273,7 +307,7 @@ def tested_section(nominal: Result, source: StudiedBench | None, subject: Subjec
     subject
         The bench with its changes.
     """
-    faults = fault_texts(nominal.bench, nominal.recordings)
+    faults = [*choice_texts(nominal.bench), *fault_texts(nominal.bench, nominal.recorded)]
     blocks: list[Block] = [Paragraph(f"{_source_text(source)}.")] if source is not None else []
     blocks += [Listing(faults)] if faults else []
     blocks += [subject.changes_block, _options_in_use(nominal.bench)]

@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from bywire.api.parameter_choice import set_for
 from bywire.bench.changes import settled
@@ -33,6 +32,7 @@ from bywire.report.wording import in_display_unit, measured_amount, unit_text
 from bywire.synthesis.study import STUDIES, Cut, Findings, Map, Study
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 _MOST_IN_BANNER = 3  # key figures; a study's first ones describe its best design

@@ -10,37 +10,64 @@ import numpy as np
 
 from bywire.api.study_tables import moving_effects, shown_figures, strongest
 from bywire.report.document import Block, FigureBlock
-from bywire.report.study.drawn_cases import LINES, POINTS, DrawnCases, drawn_cases
+from bywire.report.study.drawn_cases import CROSSES, LINES, POINTS, CaseSelection, DrawnCases
 from bywire.studies.findings import Effect, Findings, Judgment
 from bywire.studies.plan import CHUNK
 from bywire.studies.sought_cases import RareFailure
-from bywire.studies.statistics import running_share
+from bywire.studies.statistics import Spread
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
     from bywire.report.study.cases import CaseAxis
-    from bywire.report.study.probabilities import Curve
+    from bywire.report.study.probabilities import Curve, Histogram
 
 _DRIVERS = 3  # quantities on the axes of a key figure's scatter plots
 _AXES = 9  # of parallel coordinates
 
 
-def scatters(findings: Findings) -> list[Block]:
-    """Return scatter plots of each requirement's key figure versus its main influences."""
-    return [
-        _scatter_block(findings, judgment)
-        for judgment in findings.judgments
-        if findings.drivers(judgment.demand.figure)
+def case_figures(findings: Findings) -> tuple[list[Block], list[Block]]:
+    """Return figures of single cases, which one pass over all cases selects.
+
+    Returns
+    -------
+    tuple
+        Scatter plots of each requirement's key figure versus its main influences, and parallel
+        coordinates with a line for each case over quantities and figures. Both may be empty.
+    """
+    if not findings.judgments:
+        return [], []
+    # Trajectories use only a few levels, so their points would form stripes.
+    has_scatters = findings.plan.design != "morris"
+    judgments = [
+        j for j in findings.judgments if has_scatters and findings.drivers(j.demand.figure)
     ]
+    points = [
+        CaseSelection(j.known_met, j.known - j.known_met, POINTS, CROSSES, j.share.cases - j.known)
+        for j in judgments
+    ]
+    lines = CaseSelection(findings.met, findings.count - findings.met, LINES, LINES)
+    demands = [j.demand for j in findings.judgments]
+    axes = {j.demand: _scatter_names(findings, j.demand.figure) for j in judgments}
+    across = [] if findings.rare else _parallel_names(findings)
+    names = {*across, *(each.figure for each in demands), *(n for a in axes.values() for n in a)}
+    for block in findings.blocks(sorted(names)):
+        met = {each: each.is_met(np.asarray(block[each.figure], dtype=float)) for each in demands}
+        for judgment, selection in zip(judgments, points, strict=True):
+            demand = judgment.demand
+            known = np.isfinite(np.asarray(block[demand.figure], dtype=float))
+            columns = {name: block[name] for name in axes[demand]}
+            selection.add(columns, met[demand], known)
+        if across:
+            lines.add({name: block[name] for name in across}, np.all([*met.values()], axis=0))
+    drawn = [_scatter_block(findings, j, p.cases) for j, p in zip(judgments, points, strict=True)]
+    return drawn, [_parallel_block(findings, lines.cases)] if across else []
 
 
-def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
-    name, met = judgment.demand.figure, judgment.met
-    known = np.isfinite(findings.figure(name))
-    cases = drawn_cases(met, POINTS, known=known)
-    lacking = cases.lacking.size
+def _scatter_block(findings: Findings, judgment: Judgment, cases: DrawnCases) -> Block:
+    name = judgment.demand.figure
+    lacking = cases.all_lacking
     every = "all cases in which it is defined" if lacking else "all"
     crosses = (
         f"{every} meet the limit"
@@ -64,10 +91,7 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
     return FigureBlock(partial(_scatter, findings, name, cases), caption, f"scatter-{name}")
 
 
-def parallel(findings: Findings) -> Block:
-    """Return parallel coordinates, with a line for each case over quantities and figures."""
-    met = np.all([j.met for j in findings.judgments], axis=0)
-    cases = drawn_cases(met, LINES, LINES)
+def _parallel_block(findings: Findings, cases: DrawnCases) -> Block:
     thinned = cases.caption("meet all requirements", "miss one")
     outcome = (
         "all meet all requirements"
@@ -80,7 +104,7 @@ def parallel(findings: Findings) -> Block:
         f"Cases as lines; {outcome}. {thinned}" if thinned else f"Every case as a line; {outcome}."
     )
     drawn = _required(findings)
-    if not all(np.isfinite(findings.figure(name)).all() for name in drawn):
+    if any(j.known < j.share.cases for j in findings.judgments if j.demand.figure in drawn):
         text += " The line of a case in which the key figure is not defined goes to 'none'."
     if absent := [j.demand.figure for j in findings.judgments if j.demand.figure not in drawn]:
         text += f" No case has {', '.join(absent)}."
@@ -93,37 +117,52 @@ def _required(findings: Findings) -> list[str]:
     return [j.demand.figure for j in findings.judgments if j.demand.figure in known]
 
 
-def _axis(findings: Findings, name: str) -> CaseAxis:
+def _scatter_names(findings: Findings, name: str) -> list[str]:
+    """Return a key figure and its main influences."""
+    return [name, *findings.drivers(name)[:_DRIVERS]]
+
+
+def _parallel_names(findings: Findings) -> list[str]:
+    """Return the quantities and the required key figures on the axes of parallel coordinates."""
+    figures = _required(findings)
+    ranked = [each for name in figures for each in findings.drivers(name)[:_DRIVERS]]
+    varied = [v.name for v in findings.plan.varied]
+    return [*dict.fromkeys([*ranked, *varied])][: max(_AXES - len(figures), 2)] + figures
+
+
+def _axis(findings: Findings, name: str, cases: DrawnCases) -> CaseAxis:
     """Return the axis of a quantity that varies, or of a key figure."""
     from bywire.report.study.cases import CaseAxis, choice_axis
 
     varied = {v.name: v for v in findings.plan.varied}.get(name)
-    if varied is None:
-        return CaseAxis(name, findings.units[name], findings.figure(name))
-    if varied.unit:
-        return CaseAxis(name, varied.unit, np.asarray(findings.cases[name], dtype=float))
-    choices = [str(choice) for choice in varied.distribution.levels(1)]
-    return choice_axis(name, [str(each) for each in findings.cases[name]], choices)
+    column = cases.columns[name]
+    if varied is not None and not varied.unit:
+        choices = [str(choice) for choice in varied.distribution.levels(1)]
+        return choice_axis(name, [str(each) for each in column], choices, cases.rows)
+    unit = findings.units[name] if varied is None else varied.unit
+    values = np.asarray(column, dtype=float)
+    return CaseAxis(name, unit, values, ends=findings.ends.get(name), rows=cases.rows)
 
 
 def _scatter(findings: Findings, name: str, cases: DrawnCases) -> Figure:
     from bywire.report.study.cases import scatter
 
-    drivers = [_axis(findings, each) for each in findings.drivers(name)[:_DRIVERS]]
+    figure, *drivers = (_axis(findings, each, cases) for each in _scatter_names(findings, name))
     limit = _bound_of(findings, name)
     assert limit is not None
-    return scatter(_axis(findings, name), drivers, limit, cases)
+    return scatter(figure, drivers, limit, cases)
 
 
 def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
     from bywire.report.study.cases import parallel_coordinates
 
-    figures = _required(findings)
-    ranked = [each for name in figures for each in findings.drivers(name)[:_DRIVERS]]
-    varied = [v.name for v in findings.plan.varied]
-    names = list(dict.fromkeys([*ranked, *varied]))[: max(_AXES - len(figures), 2)]
-    axes = [_axis(findings, name) for name in (*names, *figures)]
-    limits = {name: limit for name in figures if (limit := _bound_of(findings, name)) is not None}
+    names = _parallel_names(findings)
+    axes = [_axis(findings, name, cases) for name in names]
+    limits = {
+        name: limit
+        for name in _required(findings)
+        if (limit := _bound_of(findings, name)) is not None
+    }
     return parallel_coordinates(axes, cases, limits)
 
 
@@ -135,7 +174,6 @@ def _bound_of(findings: Findings, name: str) -> float | None:
 # --- All figures
 
 _PANELS = 4  # requirements whose convergence is drawn
-_SHARES = 100  # points of a convergence, spaced by equal ratios
 
 _Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 
@@ -160,7 +198,9 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
     if not findings.spreads:
         return []
     if findings.rare:
-        return [*_rare_figures(findings), *scatters(findings), *_overlays(findings, recordings)]
+        scatters, _ = case_figures(findings)
+        return [*_rare_figures(findings), *scatters, *_overlays(findings, recordings)]
+    scatters, parallel = case_figures(findings)
     band = (
         ". The shaded band contains 90 % of the cases."
         if findings.plan.is_sampled
@@ -200,8 +240,7 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
         )
     if findings.plan.sensitivity is not None:
         blocks += _sensitivity_figures(findings)
-    # Trajectories use only a few levels, so their points would form stripes.
-    blocks += scatters(findings) if findings.plan.design != "morris" else []
+    blocks += scatters
     if findings.judgments and findings.plan.is_sampled:
         blocks.append(
             FigureBlock(
@@ -213,7 +252,7 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
             )
         )
     if findings.judgments:
-        blocks += [parallel(findings), *_overlays(findings, recordings)]
+        blocks += [*parallel, *_overlays(findings, recordings)]
     return blocks
 
 
@@ -242,21 +281,30 @@ def _on_choices(findings: Findings) -> str:
 
 
 def _histograms(findings: Findings) -> Figure:
-    from bywire.report.study.probabilities import Spread, histograms
+    from bywire.report.study.probabilities import histograms
 
+    varying = [each for each in findings.spreads if each.largest > each.least]
     return histograms(
         {
-            each.name: Spread(
-                findings.figure(each.name), each.unit, each.nominal, _bound_of(findings, each.name)
-            )
-            for each in findings.spreads
-            if each.largest > each.least
-        }
-        or {
-            each.name: Spread(findings.figure(each.name), each.unit, each.nominal)
-            for each in findings.spreads[:1]
+            each.name: _histogram(each, _bound_of(findings, each.name) if varying else None)
+            for each in varying or findings.spreads[:1]
         },
         has_band=findings.plan.is_sampled,
+    )
+
+
+def _histogram(spread: Spread, limit: float | None) -> Histogram:
+    from bywire.report.study.probabilities import Histogram
+
+    ends, band = (spread.least, spread.largest), (spread.quantiles[0], spread.quantiles[-1])
+    return Histogram(
+        spread.counts,
+        spread.edges,
+        ends,
+        (band[0].value, band[1].value),
+        spread.unit,
+        spread.nominal,
+        limit,
     )
 
 
@@ -279,7 +327,7 @@ def _convergence(findings: Findings) -> Figure:
 
     shown = _converging(findings)[:_PANELS]
     return convergence(
-        {str(j.demand): running_share(j.met, findings.plan.confidence, _SHARES) for j in shown},
+        {str(j.demand): j.running for j in shown},
         {str(j.demand): j.demand.probability for j in shown},
         first=CHUNK,
     )

@@ -6,7 +6,7 @@ A study of rare failures has most probable failing cases instead of worst cases.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bywire.api.run_sections import tested_brief, tested_data, tested_line, tested_section
+from bywire.api.run_sections import (
+    choice_data,
+    tested_brief,
+    tested_data,
+    tested_line,
+    tested_section,
+)
 from bywire.api.study_figures import load_drawing, study_figures
 from bywire.api.study_tables import (
     correlated,
@@ -47,7 +53,7 @@ from bywire.core.errors import FileError, InputError, ParameterError, unknown_na
 from bywire.core.parameters import field_notes
 from bywire.core.typing import Progress, silent
 from bywire.core.units import shown
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, Outcome
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -67,8 +73,10 @@ from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.running import complete
 from bywire.studies.sensitivity import VarianceShares
 from bywire.studies.sought_cases import rare_failures, worst_cases
+from bywire.studies.stated_error import ErrorCheck, error_check, with_step
 from bywire.studies.statistics import Spread
 from bywire.studies.store import Origin, StudyStore, case_bench
+from bywire.studies.stored_cases import BLOCK, stored_cases
 from bywire.studies.study_file import read_study
 
 if TYPE_CHECKING:
@@ -107,7 +115,7 @@ class ShownCases:
         return {
             j.demand.figure: self._bench(j, row)
             for j in self.findings.judgments
-            if (row := j.worst) is not None and row not in self.findings.failures
+            if (row := j.worst) is not None and self.findings.has_result(row)
         }
 
     @cached_property
@@ -125,9 +133,9 @@ class ShownCases:
 
     def _text(self, judgment: Judgment, row: int) -> str:
         kpi = judgment.demand.figure
-        if row in self.findings.failures:
+        if not self.findings.has_result(row):
             return f"{kpi}: case {self.named(row)} has no result"
-        if not math.isfinite(self.findings.figure(kpi)[row]):
+        if not math.isfinite(float(self.findings.row(row)[kpi])):
             (why,) = [each.note for each in self.results[kpi].kpis if each.name == kpi]
             return (
                 f"{kpi} is not defined in case {self.named(row)}{why and f': {why}'}; "
@@ -182,11 +190,11 @@ class ShownCases:
 
     def _doubt(self, judgment: Judgment, row: int) -> str:
         """Return a remark if a case is too close to the limit to decide it."""
-        is_close = self.findings.is_close(judgment.demand)[row]
+        is_close = self.findings.is_close(judgment.demand, row)
         return " (closer to the limit than its numerical error)" if is_close else ""
 
     def _figure(self, name: str, row: int) -> str:
-        return figure_text(self.findings, name, float(self.findings.figure(name)[row]))
+        return figure_text(self.findings, name, float(self.findings.row(row)[name]))
 
     def _write_bench(self, bench: Bench, path: Path) -> Path:
         what = "Most probable failing" if self.findings.rare else "Worst"
@@ -204,17 +212,17 @@ class ShownCases:
 def findings_data(findings: Findings) -> dict[str, Any]:
     """Return design, cases, requirements and key figures, with values in the figures' units."""
     plan = findings.plan
-    count = len(findings.cases)
+    count = findings.count
     return {
         "design": plan.design,
         "seed": plan.seed,
         "cases": count,
         "of": plan.total * (len(plan.judged_demands) if plan.sought else 1),
         "confidence": plan.confidence,
-        "failed": len(findings.failures),
+        "failed": findings.failed,
         "reasons": [
-            {"why": why, "cases": len(rows), "first": findings.number(rows[0])}
-            for why, rows in findings.reasons.items()
+            {"why": each.text, "cases": each.cases, "first": findings.number(each.row)}
+            for each in findings.reasons
         ],
         "requirements": [
             _judgment_data(findings, each) for each in (findings.judgments if count else ())
@@ -274,12 +282,12 @@ _WIDE = 0.15  # half width above which the interval of a variance share is too w
 
 def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
     """Return warnings about runs, undecided rare failures, and cases without a result."""
-    count = len(findings.cases)
+    count = findings.count
     texts = [f"{text} ({cases} of {count} cases)" for text, cases in findings.warnings.items()]
     texts += of_the_bench if not texts else []
-    if failed := findings.failures:
+    if failed := findings.failed:
         texts.append(
-            f"{len(failed)} of {count} cases have no result. They are treated as failing every "
+            f"{failed} of {count} cases have no result. They are treated as failing every "
             "requirement"
         )
     if findings.spreads:
@@ -293,11 +301,10 @@ def _undefined(findings: Findings) -> list[str]:
     """Return the figures of requirements that are not defined in some cases."""
     cases: dict[int, list[str]] = {}
     for each in findings.judgments:
-        undefined = int(np.count_nonzero(~np.isfinite(findings.figure(each.demand.figure))))
-        if lacking := undefined - len(findings.failures):
-            cases.setdefault(lacking, []).append(each.demand.figure)
+        if each.lacking:
+            cases.setdefault(each.lacking, []).append(each.demand.figure)
     return [
-        f"{', '.join(names)}: not defined in {number} of {len(findings.cases)} cases, which "
+        f"{', '.join(names)}: not defined in {number} of {findings.count} cases, which "
         "therefore fail the requirement"
         for number, names in cases.items()
     ]
@@ -325,6 +332,7 @@ def noted(findings: Findings, damaged: int) -> list[str]:
         *_rounding(findings.plan),
         *_on_intervals(findings),
         *_on_choices(findings.plan),
+        *_on_first(findings),
     ]
 
 
@@ -338,9 +346,9 @@ def _failure_texts(findings: Findings, named: Callable[[int], str]) -> list[str]
     """
     reasons = findings.reasons
     texts = []
-    for text, rows in list(reasons.items())[:_REASONS]:
-        count = f"{len(rows)} cases, " if len(rows) > 1 else ""
-        texts.append(f"{text} ({count}case {named(rows[0])})")
+    for each in reasons[:_REASONS]:
+        count = f"{each.cases} cases, " if each.cases > 1 else ""
+        texts.append(f"{each.text} ({count}case {named(each.row)})")
     rest = len(reasons) - len(texts)
     return texts + ([f"and {rest} more reasons"] if rest else [])
 
@@ -363,6 +371,15 @@ def _on_choices(plan: StudyPlan) -> list[str]:
     ]
 
 
+def _on_first(findings: Findings) -> list[str]:
+    if not findings.plan.is_sampled or findings.count == len(findings.first):
+        return []
+    return [
+        f"influences and their intervals use the first {len(findings.first)} of {findings.count} "
+        "cases. All other figures use all cases"
+    ]
+
+
 def _on_intervals(findings: Findings) -> list[str]:
     plan = findings.plan
     if plan.design == WORST:
@@ -372,7 +389,7 @@ def _on_intervals(findings: Findings) -> list[str]:
     if plan.sensitivity is not None:
         return [
             f"{plan.design}: cases share values, so the fraction of cases is not a probability",
-            *((missing_indices(findings) + _wide_shares(findings)) if len(findings.cases) else []),
+            *((missing_indices(findings) + _wide_shares(findings)) if findings.count else []),
         ]
     if not plan.is_sampled:
         return [f"{plan.design}: the cases show possible outcomes, but not their probability"]
@@ -427,6 +444,8 @@ class StudyRun(Answer):
         missing.
     damaged
         Number of chunks that bywire recomputed because their files were unreadable.
+    check
+        Numerical errors of some cases, if the bench states an error.
     """
 
     plan: StudyPlan
@@ -435,6 +454,7 @@ class StudyRun(Answer):
     nominal: Result
     status: str
     damaged: int = 0
+    check: ErrorCheck | None = None
 
     @cached_property
     def _shown(self) -> ShownCases:
@@ -444,11 +464,35 @@ class StudyRun(Answer):
     def cases(self) -> pd.DataFrame:
         """All cases: varied quantities [SI], key figures, reasons for missing results, warnings.
 
-        ``.attrs["units"]`` contains the unit of each column.
+        ``.attrs["units"]`` contains the unit of each column. A study with more than 65,536 cases
+        loads them when this property is first used, which needs up to 1 kB of memory per case.
+        `blocks` needs less.
         """
         cases = self.findings.cases
         cases.attrs["units"] = dict(self.plan.column_units)
         return cases
+
+    def blocks(self, columns: Sequence[str] | None = None) -> Iterator[pd.DataFrame]:
+        """Yield the cases in order, in frames of about 65,536 cases, with the columns of `cases`.
+
+        Parameters
+        ----------
+        columns
+            Names of the columns to load, for example ``["case", "overshoot"]``. Default: all.
+
+        Raises
+        ------
+        UnknownNameError
+            For a column that the study does not have.
+        """
+        import pandas as pd
+
+        names = self.findings.columns
+        for name in columns or ():
+            if name not in names:
+                raise unknown_name("column", str(name), names)
+        for block in self.findings.blocks(names if columns is None else columns):
+            yield pd.DataFrame(block)
 
     @property
     def data(self) -> xr.Dataset:
@@ -473,6 +517,12 @@ class StudyRun(Answer):
         return self.status in ("done", "passed")
 
     @property
+    def outcome(self) -> Outcome:
+        """Verdict on the requirements; ``undecided`` if cases are missing."""
+        words: dict[str, Outcome] = {"passed": "met", "failed": "missed", "done": "not shown"}
+        return words.get(self.status, "undecided")
+
+    @property
     def warnings(self) -> list[str]:
         """Warnings of the runs, cases without a result, and missing cases."""
         return list(self._warnings)
@@ -481,15 +531,17 @@ class StudyRun(Answer):
     def _warnings(self) -> list[str]:
         """The warnings, cached because computing them takes a pass over all cases."""
         texts = [*self.nominal.bench.outdated, *warned(self.findings, self.nominal.warnings)]
+        texts += filter(None, [self.check.warning if self.check else ""])
         if self.status == "unfinished":
             resume = StudyStore(self.folder).resume_command
-            texts.append(unfinished(self.plan, len(self.cases), resume))
+            texts.append(unfinished(self.plan, self.findings.count, resume))
         return texts
 
     @property
     def notes(self) -> list[str]:
         """Notes on rounding and repair, and on the meaning of intervals."""
-        return noted(self.findings, self.damaged)
+        checked = [self.check.note] if self.check and self.check.note else []
+        return [*noted(self.findings, self.damaged), *checked]
 
     def worst(self, kpi: str) -> Bench:
         """Return the bench of the worst case for a requirement.
@@ -515,12 +567,12 @@ class StudyRun(Answer):
         return self._shown.benches[kpi]
 
     def __repr__(self) -> str:
-        return f"<StudyRun {self.plan.name}: {len(self.cases)} cases, {self.status}>"
+        return f"<StudyRun {self.plan.name}: {self.findings.count} cases, {self.status}>"
 
     def document(self) -> Document:
         """Return verdicts, the spread of key figures, influences, worst cases and figures."""
         plan, findings = self.plan, self.findings
-        if not len(self.cases):
+        if not findings.count:
             return self._empty()
         subject = Subject.of_bench(
             plan.bench, plan.name, tested_line(plan), [each.name for each in plan.varied]
@@ -546,7 +598,7 @@ class StudyRun(Answer):
         missing = _failure_texts(findings, self._shown.named)
         return Document(
             f"Study {plan.name}",
-            f"{len(self.cases)} cases ({plan.design}, seed {plan.seed}) of {subject.line}",
+            f"{findings.count} cases ({plan.design}, seed {plan.seed}) of {subject.line}",
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
                 tested_section(self.nominal, plan.tested, subject),
@@ -605,7 +657,7 @@ class StudyRun(Answer):
             return Banner("no case has a key figure", "bad")
         outcomes = [each.outcome for each in self.findings.judgments]
         if not outcomes:
-            return Banner(f"{len(self.cases)} cases done")
+            return Banner(f"{self.findings.count} cases done")
         text = f"{outcomes.count('met')} of {len(outcomes)} requirements met"
         if open_ := outcomes.count("undecided"):
             text += f", {open_} undecided"
@@ -620,9 +672,21 @@ class StudyRun(Answer):
             "folder": str(self.folder),
             "bench": tested_data(self.plan.bench, self.plan.tested),
             **findings_data(self.findings),
+            **choice_data(self.plan.bench),
+            **({} if self.check is None else {"error_check": _check_data(self.check)}),
             "warnings": self.warnings,
             "notes": self.notes,
         }
+
+
+def _check_data(check: ErrorCheck) -> dict[str, Any]:
+    return {
+        "cases": check.cases,
+        "kpis": {
+            name: {"largest": largest, "exceeding": check.exceeding.get(name, 0)}
+            for name, largest in check.largest.items()
+        },
+    }
 
 
 # --- Studies computed, or read from their folders
@@ -689,6 +753,7 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
         raise error.reworded(
             f"{error}. This study needs {' '.join(map(_loaded_by, unloaded))}"
         ) from None
+    plan = with_step(plan, store)
     is_listed = plan.design in SPANNED
     return (plan if is_listed else replace(plan, cases=int(record["cases"]))), origin
 
@@ -708,11 +773,14 @@ def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
         findings = Findings(plan, cases, nominal.kpis, rare)
         is_whole = all(each.failure.state != "unfinished" for each in rare)
     else:
-        findings = Findings(plan, store.read(plan.chunks), nominal.kpis)
-        is_whole = len(findings.cases) == plan.total
+        stored = stored_cases(plan, store)
+        is_large = stored.count > BLOCK
+        findings = Findings(plan, stored if is_large else stored.frame(), nominal.kpis)
+        is_whole = findings.count == plan.total
     judged = status_of(findings.judgments) if findings.spreads else "failed"
     status = judged if is_whole else "unfinished"
-    return StudyRun(plan, store.folder, findings, nominal, status)
+    check = error_check(findings, nominal)
+    return StudyRun(plan, store.folder, findings, nominal, status, check=check)
 
 
 def _loaded_by(path: str) -> str:

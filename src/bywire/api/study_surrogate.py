@@ -80,7 +80,8 @@ class StudySurrogates(Answer):
         table = TableBlock(self._table())
         return Document(
             f"Surrogates of study {plan.name}",
-            f"polynomials of {len(plan.varied)} quantities, from {len(self.study.cases)} cases",
+            f"polynomials of {len(plan.varied)} quantities, from "
+            f"{len(self.study.findings.first)} cases",
             sections=[
                 Section("Key figures", [table]),
                 Section("Varied quantities", [TableBlock(varied_table(plan))]),

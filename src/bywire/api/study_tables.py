@@ -61,12 +61,10 @@ def demand_table(findings: Findings) -> Table:
 
 def _worst(findings: Findings, judgment: Judgment) -> Cell:
     """Return the worst figure, or the common figure if all cases are equal."""
-    kpi = judgment.demand.figure
-    figures = findings.figure(kpi)
-    known = np.flatnonzero(np.isfinite(figures))
-    if not known.size:
-        return Cell("-" if judgment.worst is None else "not defined")
-    value = float(figures[known[0] if judgment.worst is None else judgment.worst])
+    kpi, worst = judgment.demand.figure, judgment.worst
+    if kpi not in findings.ends:
+        return Cell("-" if worst is None else "not defined")
+    value = findings.ends[kpi][0] if worst is None else float(findings.row(worst)[kpi])
     return _figure_cell(findings, kpi, value)
 
 
@@ -383,7 +381,7 @@ def rare_notes(findings: Findings) -> list[str]:
         for each in findings.rare
         if each.failure.state == "negligible"
     ]
-    for each in findings.judgments if len(findings.cases) else ():
+    for each in findings.judgments if findings.count else ():
         if each.outcome == "undecided" and each.failure and each.failure.state == "done":
             more = (
                 "To narrow the interval, increase cases_per_level and use another folder"

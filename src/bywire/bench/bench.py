@@ -15,12 +15,17 @@ from bywire.bench.changes import settled, split_options
 from bywire.bench.experiment import (
     Case,
     Cases,
+    DefaultStep,
     Experiment,
     FaultyCase,
     as_run,
     check_seed,
+    checked_error,
     checked_interval,
     checked_step,
+    error_text,
+    longest_choice,
+    two_steps,
 )
 from bywire.bench.faults.fault_section import Injection, injections
 from bywire.bench.faults.injected import checked_sections, with_faults
@@ -41,13 +46,40 @@ from bywire.core.errors import (
 )
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
+from bywire.core.several import DifferError
 from bywire.core.traced import Traced
+from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.core.values import parsed
 from bywire.simulation.engine import engine_names, structure_of
 from bywire.simulation.run import Run
 
 _SHARE = 1e-3  # relative change that tests whether a value has an effect
+
+
+@dataclass(frozen=True)
+class StepChoice:
+    """Step that bywire chose for a stated error.
+
+    Parameters
+    ----------
+    stated
+        Stated numerical error, as a fraction.
+    step
+        Chosen step [s].
+    reached
+        Largest estimated error of the deciding key figures, as a fraction.
+    figure
+        Name of the key figure with that error.
+    benches
+        Number of benches that decided: the bench itself, and cases of a study or a range.
+    """
+
+    stated: float
+    step: float
+    reached: float
+    figure: str
+    benches: int = 1
 
 
 @dataclass(frozen=True)
@@ -71,7 +103,7 @@ class Bench:
         come from a file (see `bywire.bench.stimulus.with_nodes`). Experiments for any brake also
         accept such a mapping under the name of each additional signal of the model's Stimulus.
     step
-        Substep [s].
+        Substep [s]. NaN while `error` is stated and no step is chosen.
     record
         Recording interval [s]. None for the experiment's own interval.
     seed
@@ -90,6 +122,11 @@ class Bench:
         Engine of the runs: ``auto``, ``compiled``, ``virtual-machine``, ``cuda`` (a graphics
         processor), or the compiled C of the ECU in the loop, ``sil`` (double precision) or
         ``sil-single``.
+    error
+        Numerical error of the key figures, in place of a step: ``"0.1 %"``, or a fraction. bywire
+        chooses the step (see ``docs/bench-files.md``).
+    choice
+        Chosen step for this error. A bench with another step or error has none.
 
     Raises
     ------
@@ -103,7 +140,7 @@ class Bench:
     overrides: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     stimulus: Mapping[str, Any] = field(default_factory=dict)
-    step: float = 20e-6
+    step: float = DefaultStep(20e-6)
     record: float | None = None
     seed: int = 0
     requirements: Mapping[str, str] = field(default_factory=dict)
@@ -111,6 +148,8 @@ class Bench:
     assembly: str = ""
     faults: Sequence[Mapping[str, Any]] = ()
     engine: str = "auto"
+    error: float | str | None = None
+    choice: StepChoice | None = None
 
     def __post_init__(self) -> None:
         for key in ("experiment", "parameters", "name", "assembly"):
@@ -119,7 +158,7 @@ class Bench:
         for key in ("overrides", "options", "stimulus", "requirements"):
             object.__setattr__(self, key, dict(getattr(self, key)))  # a copy
         object.__setattr__(self, "faults", tuple(checked_sections(self.faults)))
-        object.__setattr__(self, "step", checked_step(self.step))
+        self._settle_step()
         object.__setattr__(self, "record", checked_interval(self.record))
         check_seed(self.seed)
         if self.engine not in engine_names():
@@ -150,6 +189,24 @@ class Bench:
             self._require_effects(written, self.cases(), chosen.cases)
         else:
             self._require_effects(written, self._made(chosen.preview), chosen.preview)
+
+    def _settle_step(self) -> None:
+        """Check step and error, of which a bench states one."""
+        error, choice, step = checked_error(self.error), self.choice, self.step
+        if choice is not None and (error != choice.stated or step != choice.step):
+            # A new step replaces the stated error, and a new error needs another choice.
+            error = error if error != choice.stated else None
+            step = math.nan if error is not None else step
+            choice = None
+        if error is None and isinstance(step, float) and math.isnan(step):
+            step = Bench.step  # the bench no longer states an error
+        is_stated = not isinstance(step, DefaultStep) and step == step
+        if error is not None and choice is None and is_stated:
+            raise two_steps(shown(checked_step(step), "s"), error_text(error))
+        object.__setattr__(self, "error", error)
+        object.__setattr__(self, "choice", choice)
+        is_open = error is not None and choice is None
+        object.__setattr__(self, "step", math.nan if is_open else checked_step(step))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields, from which a copy derives the rest."""
@@ -190,7 +247,7 @@ class Bench:
             if following is not None and following(par) != following(self.par):
                 return True
             others = self.cases_with(par, self.chosen_options, make)
-            made = tuple(case.aligned(self.step, self.record) for case in others)
+            made = tuple(map(self._aligned, others))
         except InputError:
             return True
         return not are_alike(cases, made)
@@ -311,7 +368,13 @@ class Bench:
                     value=repr(wanted),
                     valid=repr(given[0]),
                 )
-        return tuple(case.aligned(self.step, self.record) for case in cases)
+        return tuple(map(self._aligned, cases))
+
+    def _aligned(self, case: Case) -> Case:
+        """Return a case aligned for its step, or for the longest one if none is chosen yet."""
+        if math.isnan(self.step):
+            return case.aligned(longest_choice(case.intervals(self.record)), self.record)
+        return case.aligned(self.step, self.record)
 
     @cached_property
     def injections(self) -> tuple[Injection, ...]:
@@ -367,6 +430,31 @@ class Bench:
         known["_cases"] = made._made(self.definition.cases)
         return made
 
+    def joined(self, columns: Mapping[str, Array]) -> Bench:
+        """Return this bench with the numbers of several cases, only to set up its runs.
+
+        Parameters
+        ----------
+        columns
+            Value of each changed parameter in each case [SI], shape (cases,), by dotted name.
+
+        Raises
+        ------
+        DifferError
+            When a case is invalid, or when the cases must be set up separately.
+        """
+        made = object.__new__(type(self))
+        known = made.__dict__
+        known |= self._shared
+        known["overrides"] = {**self.overrides, **columns}
+        known["par"] = par = self.par.with_columns(columns)
+        following = self.definition.following
+        if following is not None and following(par) != self._following:
+            raise DifferError("options depend on the parameters")
+        known["chosen_options"] = self.chosen_options
+        known["_cases"] = made._made(self.definition.cases)
+        return made
+
     @cached_property
     def _shared(self) -> dict[str, Any]:
         """Properties that this bench shares with the benches that `varied` returns."""
@@ -386,6 +474,10 @@ class Bench:
         silent = {name for name in matched if switches_of(name, self._previewed)}
         kept = {name: value for name, value in changes.items() if name not in silent}
         return replace(self, overrides={**self.overrides, **(kept or changes)})
+
+    def without_choice(self) -> Bench:
+        """Return this bench without a step that bywire chose for its stated error."""
+        return self if self.choice is None else replace(self, step=Bench.step, choice=None)
 
     @property
     def _previewed(self) -> tuple[Case, ...]:

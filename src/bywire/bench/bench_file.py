@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.changes import is_relative, settled
-from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.experiment import EXPERIMENTS, error_text, two_steps
 from bywire.bench.faults.fault_section import Course, numbers_as_text
 from bywire.bench.faults.injected import checked_sections
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, experiment_of, usual_set
@@ -36,7 +36,8 @@ def bench_text(bench: Bench, comment: str = "") -> str:
     Parameters
     ----------
     bench
-        Bench to write; numbers get their SI units, and texts remain as typed.
+        Bench to write; numbers get their SI units, and texts remain as typed. A step that bywire
+        chose for a stated error is written in place of the error.
     comment
         Text of the first lines, as a comment.
 
@@ -52,6 +53,8 @@ def bench_text(bench: Bench, comment: str = "") -> str:
     """
     definition = bench.definition
     simulation: dict[str, Any] = {"step": bench.step} if bench.step != Bench.step else {}
+    if bench.error is not None and bench.choice is None:
+        simulation = {"error": error_text(float(bench.error))}
     simulation |= {} if bench.record is None else {"record": bench.record}
     simulation |= {"seed": bench.seed} if bench.seed else {}
     simulation |= {} if bench.engine == "auto" else {"engine": bench.engine}
@@ -121,6 +124,26 @@ def _text(name: str, value: Any, symbol: str) -> str:
 
 # --- Reading
 
+STEP_OR_ERROR = ("step", "error")
+"""keys of [simulation] that exclude each other"""
+
+
+def without_replaced(
+    values: Mapping[str, Any], changes: Iterable[str], prefix: str = ""
+) -> dict[str, Any]:
+    """Return settings without a step or error that changes replace by the other one.
+
+    ``prefix``: prefix of the names of the settings, and of the changes.
+    """
+    pair = [prefix + key for key in STEP_OR_ERROR]
+    stated = [key for key in pair if key in changes]
+    return {
+        key: value
+        for key, value in values.items()
+        if key not in pair or not stated or key in stated
+    }
+
+
 _Quoted = Annotated[str, Hint("write it in quotation marks")]
 
 
@@ -128,6 +151,7 @@ class SimulationSection(Section):
     """Section ``[simulation]``; a `Bench` checks its values."""
 
     step: Any = Bench.step
+    error: Any = None
     record: Any = None
     seed: Any = Bench.seed
     engine: Any = Bench.engine
@@ -135,6 +159,8 @@ class SimulationSection(Section):
     @classmethod
     def written_out(cls, content: Any) -> Any:
         """Return the section, with a seed from ``--set`` (a text) as a number."""
+        if isinstance(content, Mapping) and content.keys() >= set(STEP_OR_ERROR):
+            raise two_steps(*(str(content[key]) for key in STEP_OR_ERROR))
         seed = content.get("seed") if isinstance(content, Mapping) else None
         if isinstance(seed, str) and seed.isdecimal() and len(seed) < 20:
             return {**content, "seed": int(seed)}
@@ -156,7 +182,7 @@ class BenchFile(Section):
     faults: Any = ()
 
 
-_FAULTS = "faults"
+_FAULTS, _SIMULATION = "faults", "simulation"
 SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
 """sections of a bench file, without ``[[faults]]``"""
 _TOO_LARGE = ". Put measured traces into a separate file (options.trace)"
@@ -341,6 +367,10 @@ def _require_units(file: BenchFile, options: Table, overrides: Table) -> None:
 
 def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str, Any]:
     changed = {k: table_of(v, f"[{k}]") if k in SECTIONS else v for k, v in content.items()}
+    if _SIMULATION in changed:
+        parts = [name.partition(".") for name in changes]
+        stated = [key for section, _, key in parts if section == _SIMULATION]
+        changed[_SIMULATION] = without_replaced(changed[_SIMULATION], stated)
     for name, value in changes.items():
         section, _, key = name.partition(".")
         near = get_close_matches(section, SECTIONS, n=1, cutoff=0.8)

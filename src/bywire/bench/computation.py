@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
+import math
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from bywire.bench.bench import Bench
+from bywire.bench.bench_file import PATHS
 from bywire.bench.changes import split_options
 from bywire.bench.kpis.families import FAMILIES, Family
 from bywire.bench.stimulus import STIMULI
 from bywire.core.brake import brakes
 from bywire.core.definitions import definitions_digest
 from bywire.core.errors import InputError
+from bywire.core.version import __version__
 from bywire.simulation.engine import prepare
 
 _ROOMS = (
@@ -47,6 +52,45 @@ def computation(
         "equations": sorted({each for b in (bench, *_chosen(bench, choices)) for each in _of(b)}),
         "figures": functions_digest((*_functions(bench), *beside)),
     }
+
+
+def bench_identity(bench: Bench, choices: Iterable[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """Everything that affects a bench's recordings and key figures.
+
+    ``choices``: see `computation`.
+    """
+    identity: dict[str, Any] = {
+        "version": __version__,
+        "computed": computation(bench, choices),
+        "experiment": bench.experiment,
+        "system": bench.system,
+        "parameters": bench.par.flat(),
+        "options": bench.chosen_options.flat(),
+        "stimuli": {
+            name: [each.kind, each.parameters.model_dump(mode="json")]
+            for name, each in bench.chosen_stimuli.items()
+        },
+        "step": None if math.isnan(bench.step) else bench.step,
+        "record": bench.record,
+        "noise": bench.seed,
+    }
+    if bench.error is not None:
+        identity["error"] = float(bench.error)
+    if bench.faults:
+        identity["faults"] = bench.faults
+    if bench.engine.startswith("sil"):  # all other engines compute the same bits
+        identity["engine"] = bench.engine
+    return identity | files_identity(bench)
+
+
+def files_identity(bench: Bench) -> dict[str, Any]:
+    """Digest of every file that the options name; empty if there is none."""
+    files = {
+        name: hashlib.sha256(Path(str(value)).read_bytes()).hexdigest()
+        for name, value in bench.chosen_options.flat().items()
+        if name in PATHS and value and Path(str(value)).is_file()
+    }
+    return {"files": files} if files else {}
 
 
 def functions_digest(roots: Iterable[Any], *rooms: str, with_equations: bool = False) -> str:

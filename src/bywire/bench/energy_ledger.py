@@ -11,13 +11,16 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.signals import Role, signals_of
 from bywire.simulation.run import Run
+from bywire.simulation.run_table import change, one_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _PREFIX = "energy_"
 _ROLE = tuple(each.name for each in fields(Role))
@@ -347,7 +350,7 @@ def _losses(runs: Sequence[Run]) -> Collection[str] | None:
     A contact's loss includes the energy of a change in its parameters (see
     `bywire.simulation.advance`).
     """
-    return runs[0].model.Flow._fields if any(run.changes for run in runs) else None
+    return one_of(runs).model.Flow._fields if change(runs) else None
 
 
 def _is_delivered(delivery: Delivery) -> Any:

@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Any, NamedTuple, cast, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.bench.changes import OPTION, split_options
 from bywire.bench.energy_ledger import are_surely_sound, energy_doubts_of_cases, energy_signals
 from bywire.bench.experiment import Case, check_memory
+from bywire.bench.joined import JoinedBenches, is_plain, one_of, options_of
 from bywire.bench.kpis.families import FamilyJudge, of_cases
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases
 from bywire.bench.recording import Rows, ends_of_group, rows_of_group, watch_cases
@@ -38,6 +38,11 @@ from bywire.core.typing import Array
 from bywire.simulation import ensemble
 from bywire.simulation.ensemble import Ensemble, RunGroup, Variations, fit_lanes, simulate_group
 from bywire.simulation.run import Run, Trajectory, simulate
+from bywire.simulation.run_table import change, parameters_of
+from bywire.simulation.run_table import one_of as one_run
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def varied_choices(bench: Bench) -> Mapping[str, tuple[Any, ...]]:
@@ -99,6 +104,8 @@ class BenchEnsemble:
         each = [result.recording for result in self.results]
         if signal not in each[0]:
             raise unknown_name("signal", signal, map(str, each[0].data_vars))
+        import xarray as xr  # slow to load
+
         joined = xr.concat([recording[signal] for recording in each], dim="case", join="outer")
         return joined.assign_coords({name: ("case", v) for name, v in self.variations.items()})
 
@@ -389,6 +396,7 @@ def rounds(
     threads: int | None = None,
     signals: Callable[[Run], Wanted | None] = lambda _: None,
     limits: Sequence[Mapping[str, float]] = (),
+    hold: bool = False,
 ) -> Iterator[Round]:
     """Yield the first run of all benches, then the second run, and so on.
 
@@ -405,6 +413,8 @@ def rounds(
         ``signals(run)``: outputs to record of runs side by side; None for all.
     limits
         Maximum work of each bench's runs, by label (default: unlimited).
+    hold
+        Whether a graphics processor may hold the rows of a round until the next one.
 
     Raises
     ------
@@ -415,35 +425,55 @@ def rounds(
     KeyboardInterrupt
         When interrupted.
     """
-    every = [bench.cases() for bench in benches]
-    for number in range(max(len(each) for each in every)):
-        places = [k for k, each in enumerate(every) if number < len(each)]
-        cases = [every[k][number] for k in places]
-        runs = [run_of(benches[k], case, number) for k, case in zip(places, cases, strict=True)]
-        if limits:
-            runs = [
-                replace(run, most_work=limits[k][case.label])
-                for k, case, run in zip(places, cases, runs, strict=True)
-            ]
-        wanted = signals(runs[0])
-        outputs = runs[0].model.Output._fields if wanted is None else wanted.signals
+    for places, cases, runs in _runs(benches, limits):
+        one = one_run(runs)
+        wanted = signals(one)
+        outputs = one.model.Output._fields if wanted is None else wanted.signals
         ends = () if wanted is None else wanted.ends
-        kinds = [benches[k].engine if engine == "auto" else engine for k in places]
-        if ends and any(run.changes for run in runs):
+        kinds = [engine] * len(places)
+        if engine == "auto":
+            joined = isinstance(benches, JoinedBenches)
+            kinds = [one_of(benches).engine] if joined else [benches[k].engine for k in places]
+        if ends and change(runs):
             both, ends = {*outputs, *ends}, ()
-            outputs = tuple(name for name in runs[0].model.Output._fields if name in both)
-        check_memory(runs[0], len(runs) * len(outputs))
+            outputs = tuple(name for name in one.model.Output._fields if name in both)
+        check_memory(one, len(runs) * len(outputs))
         report = None if progress is None else partial(progress, cases[0].label)
         kept = {(case.settle, case.keep) for case in cases}
         computing = {"auto" if kind == "compiled" else kind for kind in kinds}
         is_alike = len(computing) == 1 and len(kept) == 1
         if is_alike and len(runs) > 1 and fit_lanes(runs, kinds[0]):
-            times = runs[0].schedule().record_times - cases[0].settle
+            times = one.schedule().record_times - cases[0].settle
             first = int(np.searchsorted(times, -cases[0].keep - 1e-9))
-            group = simulate_group(runs, outputs, threads, report, first, kinds[0], ends)
-            yield Round(places, cases, runs, group)
+            group = simulate_group(runs, outputs, threads, report, first, kinds[0], ends, hold)
+            try:
+                yield Round(places, cases, runs, group)
+            finally:
+                group.close()
         else:
             yield Round(places, cases, runs, _one_by_one(runs, report, kinds))
+
+
+def _runs(
+    benches: Sequence[Bench], limits: Sequence[Mapping[str, float]]
+) -> Iterator[tuple[Sequence[int], Sequence[Case], Sequence[Run]]]:
+    """Yield the indices of the benches that make a run, their cases and runs; see `rounds`."""
+    if isinstance(benches, JoinedBenches):
+        places = range(len(benches))
+        yield places, [benches.like.cases()[0]] * len(places), benches.runs
+        return
+    every = [bench.cases() for bench in benches]
+    for number in range(max(len(each) for each in every)):
+        places_there = [k for k, each in enumerate(every) if number < len(each)]
+        cases = [every[k][number] for k in places_there]
+        given = list(zip(places_there, cases, strict=True))
+        runs = [run_of(benches[k], case, number) for k, case in given]
+        if limits:
+            runs = [
+                replace(run, most_work=limits[k][case.label])
+                for (k, case), run in zip(given, runs, strict=True)
+            ]
+        yield places_there, cases, runs
 
 
 def _one_by_one(runs: Sequence[Run], report: Any, kinds: Sequence[str]) -> list[Trajectory]:
@@ -503,14 +533,19 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
     KeyboardInterrupt
         When interrupted.
     """
-    judge, options = benches[0].definition.judge, [bench.chosen_options for bench in benches]
-    families = judge if isinstance(judge, FamilyJudge) and _is_plain(benches[0]) else None
-    recordings: list[dict[str, Any]] = [static_recordings(bench) for bench in benches]
-    warnings: list[list[str]] = [[] for _ in benches]
+    one, options = one_of(benches), options_of(benches)
+    judge = one.definition.judge
+    families = judge if isinstance(judge, FamilyJudge) and is_plain(one) else None
+    recordings: list[dict[str, Any]] = (
+        [static_recordings(bench) for bench in benches]
+        if families is None
+        else [{} for _ in options]
+    )
+    warnings: list[list[str]] = [[] for _ in options]
     wanted = set() if families is None else families.signals(options)
     signals = partial(needed, wanted) if families is not None else lambda _: None
     figures: tuple[KpiOfCases, ...] | None = None
-    for made in rounds(benches, threads=threads, signals=signals):
+    for made in rounds(benches, threads=threads, signals=signals, hold=families is not None):
         group = made.trajectories
         if not isinstance(group, RunGroup):
             _recorded(benches, made, recordings, warnings)
@@ -520,11 +555,12 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
             rows, group.runs, group.unsettled.tolist(), _books(made, group, rows, threads)
         )
         for k, case, each in zip(made.places, made.cases, texts, strict=True):
-            warnings[k] += _labeled(benches[k], case, each)
+            if each:
+                warnings[k] += _labeled(benches[k], case, each)
         if families is not None:
-            if benches[0].definition.beside is not None:
+            if one.definition.beside is not None:
                 rows = inputs_recorded(rows, made.cases, wanted)
-            figures = families.of_cases(rows, options, [run.par for run in group.runs])
+            figures = families.of_cases(rows, options, parameters_of(group.runs))
             continue
         for j, (k, case) in enumerate(zip(made.places, made.cases, strict=True)):
             recordings[k][case.label] = rows_of_case(benches[k], case, rows, group, j)
@@ -533,10 +569,20 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
     return KeyFigures(figures, tuple(map(tuple, warnings)))
 
 
-def _is_plain(bench: Bench) -> bool:
-    """Return whether an experiment makes one run and adds nothing to its recording."""
-    definition = bench.definition
-    return definition.static is None and definition.finish is None and len(bench.cases()) == 1
+def numbers_per_case(bench: Bench) -> int:
+    """Return how many numbers the stimulus and the rows of a case of `key_figures_of` have.
+
+    The stimulus counts twice, because a graphics processor receives a copy of it.
+    """
+    judge, run = bench.definition.judge, next(iter(bench.runs().values()), None)
+    wanted: Wanted | None = None
+    if run is None:
+        return 1
+    if isinstance(judge, FamilyJudge) and is_plain(bench):
+        wanted = needed(judge.signals([bench.chosen_options]), run)
+    schedule, every = run.schedule(), run.model.Output._fields
+    signals = len(every if wanted is None else wanted.signals)
+    return schedule.rows * signals + 2 * schedule.stimulus_rows * len(run.model.Stimulus._fields)
 
 
 def needed(wanted: set[str], run: Run) -> Wanted | None:
@@ -557,12 +603,13 @@ def _books(made: Round, group: RunGroup, rows: Rows, threads: int | None) -> lis
     For most runs, the two ends rule out such warnings. Otherwise, all rows are computed.
     """
     if group.end_names:
-        if are_surely_sound(cast(xr.Dataset, ends_of_group(group)), made.runs):
-            return [[] for _ in made.runs]
-        every, first = energy_signals(made.runs[0]), group.runs[0].schedule().rows
+        if are_surely_sound(cast("xr.Dataset", ends_of_group(group)), made.runs):
+            return [[] for _ in made.places]
+        one = one_run(made.runs)
+        every, first = energy_signals(one), one.schedule().rows
         group = simulate_group(made.runs, every, threads, first=first - group.time.size)
         rows = rows_of_group(group, made.cases[0].settle)
-    return energy_doubts_of_cases(cast(xr.Dataset, rows), len(made.runs), made.runs)
+    return energy_doubts_of_cases(cast("xr.Dataset", rows), len(made.runs), made.runs)
 
 
 def _recorded(

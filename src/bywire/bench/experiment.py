@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import lru_cache
 from string import Formatter
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core import units
 from bywire.core.arguments import checked
+from bywire.core.callers import option
 from bywire.core.errors import ModelError, StepError, not_valid, quoted
 from bywire.core.machine import machine_memory as _memory
 from bywire.core.model import Model
@@ -26,42 +26,12 @@ from bywire.core.quantities import BY_SIZE, Unit, display_unit
 from bywire.core.registry import Kind, instances
 from bywire.core.units import convert, shown, unit_text
 from bywire.simulation.advance import Change
+from bywire.simulation.noise import Noise, put_noise
 from bywire.simulation.run import Run
-from bywire.simulation.schedule import plan
+from bywire.simulation.schedule import longest_step, plan
 
-_WORD = 32  # bits
-_POOL = 4  # minimum number of words of a seed before those of its child
-
-
-def put_noise(samples: NDArray[np.float64], seed: Sequence[int], child: int) -> None:
-    """Fill samples with standard normal noise, shape (samples,).
-
-    The samples equal those of ``SeedSequence(seed, spawn_key=(child,))``. Passing the seed's words
-    directly takes a third of the time.
-
-    Parameters
-    ----------
-    seed
-        Integers >= 0.
-    child
-        Number of the generator among those of this seed, >= 0.
-    """
-    words = [word for number in seed for word in _words(number)]
-    words += [0] * (_POOL - len(words))
-    sequence = np.random.SeedSequence(np.array([*words, *_words(child)], dtype=np.uint32))
-    generator = np.random.Generator(np.random.PCG64(sequence))
-    if samples.flags.c_contiguous:
-        generator.standard_normal(out=samples)
-    else:
-        samples[:] = generator.standard_normal(samples.size)
-
-
-def _words(number: int) -> Iterator[int]:
-    """Yield the 32-bit words of an integer, lowest first; one word for zero."""
-    yield number & 0xFFFFFFFF
-    while number := number >> _WORD:
-        yield number & 0xFFFFFFFF
-
+if TYPE_CHECKING:
+    import xarray as xr
 
 # --- Summaries: one line on an experiment, with the values of its options
 
@@ -148,7 +118,7 @@ def _value_text(value: Any, symbol: str, unit: str) -> str:
 
 # --- Experiments
 
-Recordings = Mapping[str, xr.Dataset]
+Recordings = Mapping[str, "xr.Dataset"]
 _LENGTHENED = 100.0  # maximum settling until all sample times coincide, relative to the run
 
 
@@ -209,14 +179,21 @@ class Case:
         Raises
         ------
         StepError
-            When the step does not divide a sample time or the recording interval, or the common
-            multiple is much longer than the run.
+            When the step does not divide a sample time or the recording interval, the common
+            multiple is much longer than the run, or no step is chosen yet (NaN).
         """
+        if math.isnan(step):
+            raise without_step("this command does not choose a step")
         record = self.record if interval is None else interval
         periods = tuple((task.name, task.period) for task in self.model.tasks(self.par))
         settle = _settling(self.settle, self.duration, periods, step, record)
         is_aligned = settle == self.settle and record == self.record
         return self if is_aligned else replace(self, settle=settle, record=record)
+
+    def intervals(self, interval: float | None = None) -> tuple[float, ...]:
+        """Return all intervals [s] that a step must divide; ``interval``: as in `aligned`."""
+        record = self.record if interval is None else interval
+        return (*(task.period for task in self.model.tasks(self.par)), record)
 
 
 @lru_cache(maxsize=256)  # the cases of a study share it
@@ -384,18 +361,23 @@ class _Driven:
     seed: tuple[int, ...]
 
     def __call__(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        rows = np.zeros((t.size, len(self.case.model.Stimulus._fields)))
+        rows, noise = np.zeros((t.size, len(self.case.model.Stimulus._fields))), self.noise
         self.put_into(rows, t)
+        for child, column in enumerate(noise.columns):
+            put_noise(rows[:, column], noise.seed, child)
         return rows
 
+    @property
+    def noise(self) -> Noise:
+        """Noise that `put_into` leaves out."""
+        fields = self.case.model.Stimulus._fields
+        return Noise(self.seed, tuple(k for k, n in enumerate(fields) if n.startswith("noise_")))
+
     def put_into(self, rows: NDArray[np.float64], t: NDArray[np.float64]) -> None:
-        """Write the stimulus into rows of zeros; see `bywire.simulation.run.put_into`."""
-        given, drawn = driven_at(self.case, t - self.case.settle), 0
+        """Write the stimulus without noise into rows of zeros; see `bywire.simulation.run`."""
+        given = driven_at(self.case, t - self.case.settle)
         for k, name in enumerate(self.case.model.Stimulus._fields):
-            if name.startswith("noise_"):
-                put_noise(rows[:, k], self.seed, drawn)
-                drawn += 1
-            elif name in given:
+            if name in given and not name.startswith("noise_"):
                 rows[:, k] = given[name]
 
 
@@ -448,6 +430,12 @@ EXPERIMENTS = Kind("experiment", ("experiments",), instances(Experiment))
 
 SHORTEST_STEP = 1e-9
 """shortest substep [s]: below it, a single tick of an ECU would take seconds to compute"""
+LARGEST_ERROR = 0.1
+"""largest numerical error that a bench may state"""
+SMALLEST_ERROR = 1e-6
+"""smallest numerical error that a bench may state"""
+FINEST = 1e-6
+"""shortest substep [s] that bywire chooses; a run with it takes 20 times as long as usual"""
 LARGEST_SEED = 2**63 - 1
 """maximum seed that a recording's file can store"""
 
@@ -455,9 +443,86 @@ _COPIES = 3  # of the recorded rows in memory, while they become a dataset and a
 _GIGA = 1e9
 
 
+class DefaultStep(float):
+    """Substep [s] that nobody stated."""
+
+
 def checked_step(value: Any) -> float:
     """Return a substep [s], or raise a StepError."""
+    if isinstance(value, DefaultStep):
+        return value
     return _checked_time("simulation.step", value, SHORTEST_STEP, False, "usually 20 us")
+
+
+def checked_error(value: Any) -> float | None:
+    """Return a numerical error as a fraction, None if none is stated, or raise a StepError."""
+    if value is None:
+        return None
+    text = value if isinstance(value, str) else getattr(value, "text", "")
+    error = units.Written(units.parse(value, "%", "simulation.error", 0.1), text)
+    if SMALLEST_ERROR <= error <= LARGEST_ERROR:
+        return error
+    written = quoted(text) if text else f"{error:g}"
+    valid = f">= {error_text(SMALLEST_ERROR)} and <= {error_text(LARGEST_ERROR)}"
+    raise not_valid("simulation.error", written, valid, 'for example, "0.1 %"', StepError)
+
+
+def longest_choice(intervals: Collection[float]) -> float:
+    """Return twice the longest step [s] that bywire may choose.
+
+    Parameters
+    ----------
+    intervals
+        All sample times and recording intervals [s], which steps and their doubles divide.
+
+    Raises
+    ------
+    StepError
+        When the intervals permit only steps below `FINEST`.
+    """
+    longest = longest_step(intervals)
+    if longest >= 2.0 * FINEST:
+        return longest
+    texts = ", ".join(shown(each, "s", digits=9) for each in sorted(set(intervals)))
+    raise StepError(
+        f"simulation.error is not possible with the sample times and recording intervals {texts}, "
+        f"because bywire does not choose steps below {shown(FINEST, 's', 'us')}. Choose multiples "
+        f"of each other, or type {option('overrides', {'simulation.step': '20us'})}",
+        name="simulation.error",
+        valid="simulation.step",
+    )
+
+
+def two_steps(step: str, error: str) -> StepError:
+    """Return the error for a bench that states a step and a numerical error."""
+    return StepError(
+        f"simulation.step = {step} and simulation.error = {error} exclude each other, because "
+        "the error determines the step. Remove one of them",
+        name="simulation.error",
+        value=error,
+        valid="simulation.step or simulation.error",
+    )
+
+
+def without_step(reason: str) -> StepError:
+    """Return the error for a stated numerical error for which no step is chosen."""
+    return StepError(
+        f"simulation.error is not possible here, because {reason}. Type "
+        f"{option('overrides', {'simulation.step': '20us'})}",
+        name="simulation.error",
+        valid="simulation.step",
+    )
+
+
+def error_text(error: float) -> str:
+    """Return a numerical error in percent.
+
+    Examples
+    --------
+    >>> error_text(0.001)
+    '0.1 %'
+    """
+    return f"{100.0 * error:.10g} %"
 
 
 def checked_interval(value: Any) -> float | None:

@@ -16,7 +16,7 @@ from bywire.core.signals import signals_of
 
 _PARAMETER, _KPI, _SIMULATION = "", "requirements.", "simulation."
 _KINDS = {_PARAMETER: "parameter", OPTION: "option", _KPI: "KPI in [requirements]"}
-_SETTINGS = ("step", "record", "seed", "engine")
+_SETTINGS = ("step", "error", "record", "seed", "engine")
 
 
 def refuse_misplaced(

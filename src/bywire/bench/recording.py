@@ -5,24 +5,29 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Collection, ItemsView, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, ItemsView, Iterator, Mapping, Sequence, ValuesView
 from functools import cache, cached_property
 from numbers import Number
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
-import pandas as pd
-import xarray as xr
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from bywire.bench.energy_ledger import energy_doubts, energy_signals, role_attributes
+from bywire.core.on_demand import OnDemand
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.typing import Array
 from bywire.core.version import __version__
 from bywire.simulation.advance import put_in_signals
 from bywire.simulation.ensemble import RunGroup
-from bywire.simulation.run import Run, Trajectory, doubts_of
+from bywire.simulation.run import Run, Trajectory
+from bywire.simulation.run_table import doubts_of, one_of, parameters_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from bywire.simulation.cuda import HeldRows
 
 
 def parameter_hash(par: ParameterSet) -> str:
@@ -45,18 +50,16 @@ def record(
     xarray.Dataset
         Dimension ``time`` [s]; variables with ``units`` and ``long_name``.
     """
+    return watched_rows(run, trajectory, settle, keep, notes).dataset
+
+
+def watched_rows(
+    run: Run, trajectory: Trajectory, settle: float, keep: float, notes: Mapping[str, Any]
+) -> Rows:
+    """Return the content of a run's recording as plain arrays, with its warnings; see `record`."""
     rows = rows_of(run, trajectory, settle, keep)
-    variables = {n: ("time", row.values, dict(row.attrs)) for n, row in rows.data_vars.items()}
-    # A pandas index: for an array, xarray would import pint to check its type.
-    axis = pd.Index(rows["time"].values, name="time")
-    recording = xr.Dataset(variables, coords={"time": ("time", axis, {"units": "s"})})
-    recording["time"].attrs["long_name"] = "time"
-    recording.attrs = {
-        **run_notes(run, trajectory),
-        "warnings": watch(cast(xr.Dataset, rows), run, trajectory),
-        **notes,
-    }
-    return recording
+    warnings = watch(cast("xr.Dataset", rows), run, trajectory)
+    return rows.noted({**run_notes(run, trajectory), "warnings": warnings, **notes})
 
 
 def run_notes(run: Run, trajectory: Trajectory) -> dict[str, Any]:
@@ -99,18 +102,19 @@ def rows_of(
 
 def rows_of_group(group: RunGroup, settle: float) -> Rows:
     """Return the content of the recordings of several runs, for the computed rows."""
-    signals = dict(zip(group.names, group.values, strict=True))
-    attributes = _attributes_of(group.runs[0].model.Output)
-    return Rows(
+    signals = group.signals
+    attributes = _attributes_of(one_of(group.runs).model.Output)
+    rows = Rows(
         np.round(group.time - settle, 12), signals, {name: attributes[name] for name in signals}
     )
+    rows.held = None if group.held is None else Held(group.held, group.names)
+    return rows
 
 
 def ends_of_group(group: RunGroup) -> Rows:
     """Return the first and last rows of several runs, with all signals that are recorded there."""
-    values = {name: each[:, [0, -1]] for name, each in zip(group.names, group.values, strict=True)}
-    values |= zip(group.end_names, group.ends, strict=True)
-    attributes = _attributes_of(group.runs[0].model.Output)
+    values = {**group.edges, **dict(zip(group.end_names, group.ends, strict=True))}
+    attributes = _attributes_of(one_of(group.runs).model.Output)
     signals = {name: values[name] for name in attributes if name in values}
     return Rows(group.time[[0, -1]], signals, {name: attributes[name] for name in signals})
 
@@ -144,7 +148,7 @@ def watch_cases(
     iteration's limit; ``books``: `energy_doubts` of each run.
     """
     solver = map(solver_doubts, doubts_of(runs), unsettled)
-    model, pars = runs[0].model, [run.par for run in runs]
+    model, pars = one_of(runs).model, parameters_of(runs)
     rows.silent = model.silent(rows, pars)
     asked = set(model.may_warn(rows, pars))
     return [
@@ -168,7 +172,7 @@ def energy_doubts_of(run: Run, trajectory: Trajectory) -> list[str]:
     attributes = _attributes_of(run.model.Output)
     energies = {name: trajectory[name] for name in energy_signals(run)}
     rows = Rows(trajectory.time, energies, {name: attributes[name] for name in energies})
-    return energy_doubts(cast(xr.Dataset, rows), [run])
+    return energy_doubts(cast("xr.Dataset", rows), [run])
 
 
 # --- Rows in place of a recording, for many runs without plots
@@ -265,6 +269,8 @@ class Row(NDArrayOperatorsMixin):
 
     @property
     def _array(self) -> xr.DataArray:
+        import xarray as xr  # slow to load
+
         axis = (TIME, self._time, dict(self._rows._attributes[TIME]))
         return xr.DataArray(
             self.values, {TIME: axis}, (TIME,), self._name or None, dict(self.attrs)
@@ -279,6 +285,22 @@ def _window(time: Array, asked: tuple[Any, ...], given: Mapping[str, Any]) -> sl
     begin = 0 if wanted.start is None else int(np.searchsorted(time, wanted.start, "left"))
     end = time.size if wanted.stop is None else int(np.searchsorted(time, wanted.stop, "right"))
     return slice(begin, max(begin, end))
+
+
+class Held(NamedTuple):
+    """Rows of several runs that a graphics processor holds, and the names of their signals."""
+
+    rows: HeldRows
+    names: tuple[str, ...]
+
+    def address(self, name: str) -> int:
+        """Return the address of a signal's rows in the first run; other runs follow."""
+        return self.rows.address(self.names.index(name))
+
+    def extremes(self, name: str) -> Array:
+        """Return the first, lowest, highest and last row of a signal, shape (runs, 4)."""
+        extremes: Array = self.rows.extremes[self.names.index(name)]
+        return extremes
 
 
 class Rows:
@@ -301,6 +323,9 @@ class Rows:
         Parameters of the run, if known.
     """
 
+    stands_for = "Dataset"
+    """type whose interface it has, for checks of arguments"""
+
     def __init__(
         self,
         time: Array,
@@ -310,10 +335,15 @@ class Rows:
         par: ParameterSet | None = None,
     ) -> None:
         self._notes, self.par = notes, par
-        self._values = {**signals, TIME: time}
+        self._values: Mapping[str, Array] = (
+            {**signals, TIME: time}  # the time keeps its place among the signals
+            if isinstance(signals, dict)
+            else OnDemand((*signals, TIME), lambda name: time if name == TIME else signals[name])
+        )
         self._attributes = {**attributes, TIME: {"units": "s", "long_name": "time"}}
-        self._signals = tuple(signals)
+        self._signals = tuple(name for name in signals if name != TIME)
         self.silent: frozenset[str] = frozenset()  # parts of the model without warnings
+        self.held: Held | None = None  # by a graphics processor
         self.sizes = {TIME: time.size}
 
     @classmethod
@@ -322,7 +352,11 @@ class Rows:
 
         A static characteristic, for example, has no rows over time.
         """
-        if set(recording.dims) != {TIME} or set(recording.coords) != {TIME}:
+        if (
+            isinstance(recording, cls)
+            or set(recording.dims) != {TIME}
+            or set(recording.coords) != {TIME}
+        ):
             return recording
         each = {str(name): one for name, one in recording.variables.items() if name != TIME}
         rows = cls(
@@ -332,7 +366,29 @@ class Rows:
             lambda: recording.attrs,
         )
         rows.__dict__["dataset"] = recording  # available already
-        return cast(xr.Dataset, rows)  # it has the same interface
+        return cast("xr.Dataset", rows)  # it has the same interface
+
+    def outline(self, name: str) -> Array | None:
+        """Return first, lowest, highest and last values of a signal in each run, shape (runs, 4).
+
+        None for rows that a graphics processor does not hold, or that are not finite.
+        """
+        values = None if self.held is None else self.held.extremes(name)
+        return None if values is None or not np.isfinite(values).all() else values
+
+    def outlined(self) -> Rows | None:
+        """Return rows with the first, lowest, highest and last value of each signal.
+
+        None for rows that a graphics processor does not hold.
+        """
+        if self.held is None:
+            return None
+        time = self._values[TIME][[0, 0, -1, -1]]
+        return Rows(time, OnDemand(self._signals, self.held.extremes), self._attributes)
+
+    def unit(self, name: str) -> str:
+        """Return the SI unit of a signal; ``"1"`` if none is recorded."""
+        return str(self._attributes[name].get("units", "1"))
 
     def case(
         self,
@@ -341,8 +397,13 @@ class Rows:
         par: ParameterSet | None = None,
     ) -> Rows:
         """Return the rows of one run of several."""
-        signals = {name: self._values[name][k] for name in self._signals}
-        rows = Rows(self._values[TIME], signals, self._attributes, notes, par)
+        values = self._values
+        signals: Mapping[str, Array] = (
+            {name: values[name][k] for name in self._signals}
+            if isinstance(values, dict)
+            else OnDemand(self._signals, lambda name: values[name][k])
+        )
+        rows = Rows(values[TIME], signals, self._attributes, notes, par)
         rows.silent = self.silent
         return rows
 
@@ -381,11 +442,16 @@ class Rows:
         if any(each is None for each in plain.values()):
             return self.dataset.assign(given)
         known = {name: each for name, each in plain.items() if each is not None}
-        every = {name: self._values[name] for name in self._signals}
         return self._like(
-            every | {name: values for name, (values, _) in known.items()},
+            {**self._values, **{name: values for name, (values, _) in known.items()}},
             {**self._attributes, **{name: attrs for name, (_, attrs) in known.items()}},
         )
+
+    def noted(self, notes: Mapping[str, Any]) -> Rows:
+        """Return the rows with their own attributes: of the whole recording, and of each signal."""
+        signals = {name: self._values[name] for name in self._signals}
+        attributes = {name: dict(self._attributes[name]) for name in self._signals}
+        return Rows(self._values[TIME], signals, attributes, lambda: notes, self.par)
 
     def with_signals(
         self, signals: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]
@@ -414,6 +480,20 @@ class Rows:
         """Return the signals with their names, like a Dataset."""
         return self.data_vars.items()
 
+    def values(self) -> ValuesView[Row]:
+        """Return the signals, like a Dataset."""
+        return self.data_vars.values()
+
+    @property
+    def dims(self) -> tuple[str]:
+        """Name of the only dimension."""
+        return (TIME,)
+
+    @property
+    def nbytes(self) -> int:
+        """Size of all values in memory [bytes]."""
+        return sum(each.nbytes for each in self._values.values())
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._signals)
 
@@ -439,18 +519,59 @@ class Rows:
     @cached_property
     def dataset(self) -> xr.Dataset:
         """Rows as a Dataset."""
-        each = {
-            name: (TIME, values, dict(self._attributes[name]))
-            for name, values in self._values.items()
+        import pandas as pd  # slow to load, like xarray
+        import xarray as xr
+
+        variables = {
+            name: (TIME, self._values[name], dict(self._attributes[name])) for name in self._signals
         }
-        time = each.pop(TIME)
-        return xr.Dataset(each, coords={TIME: time}, attrs=self.attrs)
+        # A pandas index: for an array, xarray would import pint to check its type.
+        axis = pd.Index(self._values[TIME], name=TIME)
+        coords = {TIME: (TIME, axis, dict(self._attributes[TIME]))}
+        return xr.Dataset(variables, coords=coords, attrs=self.attrs)
+
+
+class Recordings(Mapping[str, "xr.Dataset"]):
+    """Recordings by label, which become datasets when they are read.
+
+    Parameters
+    ----------
+    recordings
+        Rows, or datasets.
+    """
+
+    def __init__(self, recordings: Mapping[str, Any]) -> None:
+        self._recordings = dict(recordings)
+
+    @property
+    def rows(self) -> Mapping[str, xr.Dataset]:
+        """The recordings as rows, except those that are already datasets."""
+        return {
+            label: each.__dict__.get("dataset", each) if isinstance(each, Rows) else each
+            for label, each in self._recordings.items()
+        }
+
+    def __getitem__(self, label: str) -> xr.Dataset:
+        each = self._recordings[label]
+        return each.dataset if isinstance(each, Rows) else cast("xr.Dataset", each)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._recordings)
+
+    def __len__(self) -> int:
+        return len(self._recordings)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Recordings, (dict(self),)
 
 
 def _plain(given: Any, time: Array) -> tuple[Array, Mapping[str, Any]] | None:
     """Return values and attributes of a signal for `Rows.assign`; None for other arguments."""
     if isinstance(given, Row):
-        return (given.values, given.attrs) if given._time is time else None
+        return (given.values, dict(given.attrs)) if given._time is time else None
     if isinstance(given, tuple) and given[0] == TIME and np.shape(given[1]) == time.shape:
         return np.asarray(given[1]), given[2] if len(given) > 2 else {}
     return None
@@ -461,6 +582,9 @@ class _Named(Mapping[str, Row]):
 
     def __init__(self, rows: Rows, names: tuple[str, ...]) -> None:
         self._rows, self._names = rows, names
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
 
     def __getitem__(self, name: str) -> Row:
         row: Row = self._rows[name]

@@ -7,9 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict, read_limit
@@ -17,6 +15,9 @@ from bywire.core.callers import option
 from bywire.core.errors import FileError, InputError
 from bywire.core.scratch import require_finished
 from bywire.data.netcdf import read_recording
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 RECORD = "result.json"
 """file in a result folder that describes the folder's content"""

@@ -7,15 +7,14 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run, check_extent, check_recordings
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.recording import Rows, record, rows_of, run_notes, watch
+from bywire.bench.recording import Recordings, Rows, rows_of, run_notes, watch, watched_rows
 from bywire.bench.requirements import Verdict, judge, status_of
 from bywire.bench.step_error import (
     MOST_WORK,
@@ -32,6 +31,9 @@ from bywire.core.interrupts import interrupt_handled, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, Trajectory, simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,12 @@ class Result:
     verdicts: tuple[Verdict, ...]
     status: str
     unestimated: str = ""
+
+    @property
+    def recorded(self) -> Mapping[str, xr.Dataset]:
+        """The recordings as `Rows`, which load faster than datasets, if they were not read yet."""
+        made = self.recordings
+        return made.rows if isinstance(made, Recordings) else made
 
     @property
     def recording(self) -> xr.Dataset:
@@ -86,7 +94,7 @@ class Result:
         """Warnings of all runs."""
         warnings = [
             f"{label}: {text}" if len(self.recordings) > 1 else text
-            for label, recording in self.recordings.items()
+            for label, recording in self.recorded.items()
             for text in np.atleast_1d(recording.attrs.get("warnings", [])).tolist()
             if text  # a brake may write one text instead of a list
         ]
@@ -150,7 +158,7 @@ def run(
     except KeyboardInterrupt:  # outside the engine, which handles interrupts itself
         interrupt_handled()
         kpis = judged(bench, recordings).kpis if is_complete else ()
-        return Result(bench, recordings, kpis, (), "interrupted")
+        return Result(bench, Recordings(recordings), kpis, (), "interrupted")
     result = judged(bench, recordings, others)
     note = abandoned(failures) if others else unestimated(failures)
     return replace(result, unestimated=note) if failures and note else result
@@ -219,10 +227,10 @@ def run_of(bench: Bench, case: Case, number: int) -> Run:
 
 
 def recording_of(bench: Bench, case: Case, computed: Run, trajectory: Trajectory) -> xr.Dataset:
-    """Return the recording of a case, with the signals that its experiment adds."""
+    """Return the recording of a case as `Rows`, with the signals that its experiment adds."""
     notes = _case_notes(bench, case)
-    recording = record(computed, trajectory, case.settle, case.keep, notes)
-    return _finished(bench, case, recording)
+    rows = watched_rows(computed, trajectory, case.settle, case.keep, notes)
+    return _finished(bench, case, cast("xr.Dataset", rows))
 
 
 def _finished(bench: Bench, case: Case, recording: xr.Dataset) -> xr.Dataset:
@@ -253,7 +261,7 @@ def rows_recorded(
 ) -> tuple[xr.Dataset, list[str]]:
     """Return the content of `recording_of` as plain arrays, and the warnings of the run."""
     rows = rows_of(computed, trajectory, case.settle, case.keep, partial(_case_notes, bench, case))
-    recording = cast(xr.Dataset, rows)  # it has the same interface
+    recording = cast("xr.Dataset", rows)  # it has the same interface
     warnings = watch(recording, computed, trajectory)
     return _finished(bench, case, recording), warnings
 
@@ -266,7 +274,7 @@ def rows_of_case(
     def notes() -> dict[str, Any]:
         return {**run_notes(group[k].run, group[k]), **_case_notes(bench, case)}
 
-    return _finished(bench, case, cast(xr.Dataset, rows.case(k, notes, group[k].run.par)))
+    return _finished(bench, case, cast("xr.Dataset", rows.case(k, notes, group[k].run.par)))
 
 
 def judged(
@@ -293,10 +301,10 @@ def judged(
         kpis = with_step_errors(kpis, in_others, recordings)
         note_step_errors(recordings, others)
     verdicts = judge(bench.limits.values(), kpis)
-    return Result(bench, recordings, kpis, verdicts, status_of(verdicts))
+    return Result(bench, Recordings(recordings), kpis, verdicts, status_of(verdicts))
 
 
-def _bench_notes(bench: Bench) -> dict[str, str]:
+def _bench_notes(bench: Bench) -> dict[str, Any]:
     """Return the attributes of a recording that describe its bench."""
     return {
         "model": bench.system,
@@ -305,6 +313,7 @@ def _bench_notes(bench: Bench) -> dict[str, str]:
         "options": bench.chosen_options.model_dump_json(),
         "stimulus": json.dumps(_described(bench.chosen_stimuli)),
         **({"faults": json.dumps(bench.faults, default=str)} if bench.faults else {}),
+        **({} if bench.error is None else {"stated_error": float(bench.error)}),
     }
 
 

@@ -16,14 +16,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import RunError, StepError, WorkLimitError
 from bywire.core.typing import Array
 from bywire.simulation.run import Run
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 OTHER_STEPS = (0.5, 2.0)
 """ratios of other steps to the run's step, which show the order"""
@@ -120,14 +123,14 @@ def with_step_errors(
         Figures with ``error`` in their unit, infinite if a figure is undefined with another step.
     """
     intervals = _intervals(recordings)
-    rounding = {unit: ROUNDING * peak for unit, peak in _peaks(recordings).items()}
+    rounding = {unit: ROUNDING * peak for unit, peak in peaks_of(recordings).items()}
     by_name = {factor: {each.name: each.value for each in made} for factor, made in others.items()}
 
     def estimated(kpi: Kpi) -> Kpi:
         values = {factor: known[kpi.name] for factor, known in by_name.items()}
         least = rounding.get(kpi.unit, 0.0)
-        error, converges = _estimate(kpi.value, values, max(least, ROUNDING * abs(kpi.value)))
-        reading = _reading(kpi.value, intervals) if kpi.unit == "s" else 0.0
+        error, converges = estimate(kpi.value, values, max(least, ROUNDING * abs(kpi.value)))
+        reading = reading_error(kpi.value, intervals) if kpi.unit == "s" else 0.0
         return replace(kpi, error=error + least + reading, converges=converges)
 
     return tuple(map(estimated, kpis))
@@ -174,11 +177,17 @@ def note_step_errors(
             signal.attrs["step_error_max"] = max(float(np.max(np.abs(e))) for e in errors)
 
 
-def _estimate(value: float, others: Mapping[float, float], rounding: float) -> tuple[float, bool]:
-    """Return the error of a figure, and whether it converges.
+def estimate(value: float, others: Mapping[float, float], rounding: float) -> tuple[float, bool]:
+    """Return the error of a figure due to the step, and whether it converges.
 
-    ``others``: the figure with other steps, by the ratio of the steps; ``rounding``: maximum
-    difference that rounding alone explains.
+    Parameters
+    ----------
+    value
+        The figure.
+    others
+        The figure with other steps, by the ratio of the steps.
+    rounding
+        Maximum difference that rounding alone explains.
     """
     apart = {factor: _apart(value, other) for factor, other in others.items()}
     if any(not math.isfinite(each) for each in apart.values()):
@@ -204,7 +213,7 @@ def _rms(error: Array) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def _peaks(recordings: Mapping[str, xr.Dataset]) -> dict[str, float]:
+def peaks_of(recordings: Mapping[str, xr.Dataset]) -> dict[str, float]:
     """Return the maximum magnitude of all signals of each unit, without pure numbers."""
     peaks: dict[str, float] = {}
     for recording in recordings.values():
@@ -221,7 +230,7 @@ def _intervals(recordings: Mapping[str, xr.Dataset]) -> set[float]:
     return {float(t[-1] - t[0]) / (t.size - 1) for t in times}
 
 
-def _reading(time: float, intervals: Iterable[float]) -> float:
+def reading_error(time: float, intervals: Iterable[float]) -> float:
     """Return the error of a time [s]: the interval if it was read at a row, else zero."""
     if not math.isfinite(time) or abs(time) < _SAME:  # the start of the run is exact
         return 0.0

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -11,11 +12,12 @@ import numpy as np
 
 from bywire.bench.bench import Bench
 from bywire.bench.changes import split_options
-from bywire.bench.computation import computation
+from bywire.bench.computation import computation, files_identity
 from bywire.bench.experiment import Case
 from bywire.bench.faults.fault_section import AT_ZERO, Injection
 from bywire.bench.faults.injected import taps_of, touched
 from bywire.bench.faults.modes import Mode
+from bywire.bench.step_choice import with_chosen_step
 from bywire.campaigns.residual import Residual, first_time, least_of_the_last, missed_ticks
 from bywire.cases.identity import as_json, digest_of
 from bywire.core.errors import ParameterError, unknown_name
@@ -23,11 +25,12 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant
 from bywire.core.section import Name, Section
 from bywire.core.signals import Signal
-from bywire.core.typing import Array
+from bywire.core.typing import Array, Progress
 from bywire.core.values import written
 from bywire.core.version import __version__
 from bywire.simulation.tapped import Tap
 from bywire.studies.plan import CHUNK, StudyPlan, Varied
+from bywire.studies.stated_error import probing_cases
 
 Sense = Literal["above", "below", "above_healthy", "below_healthy", "below_share"]
 SENSES: tuple[Sense, ...] = ("above", "below", "above_healthy", "below_healthy", "below_share")
@@ -238,6 +241,24 @@ class CampaignPlan:
     rates: Mapping[str, float] = field(default_factory=dict)
     reaction: Reaction | None = None
 
+    def with_step(self, progress: Progress | None = None) -> CampaignPlan:
+        """Return the campaign with the step for the error that its bench states, if it states one.
+
+        The key figures of fault-free runs decide: of the bench itself, and at the quantiles of the
+        quantities that scatter.
+
+        Raises
+        ------
+        StepError
+            When no step meets the error.
+        RunError
+            When the bench fails.
+        """
+        study = StudyPlan(self.name, self.bench, self.varied, correlations=self.correlations)
+        cases = probing_cases(study) if self.varied else ()
+        bench = with_chosen_step(self.bench, cases, progress)
+        return self if bench is self.bench else replace(self, bench=bench)
+
     @property
     def tuning(self) -> int:
         """Number of fault-free runs that tune thresholds: the first ones."""
@@ -341,10 +362,12 @@ class CampaignPlan:
                 "experiment": bench.experiment,
                 "parameters": bench.par.flat(),
                 "options": bench.chosen_options.flat(),
+                **files_identity(bench),
                 "stimulus": str(dict(bench.stimulus)),
-                "step": bench.step,
+                "step": None if math.isnan(bench.step) else bench.step,
                 "record": bench.record,
                 "noise": bench.seed,
+                **({} if bench.error is None else {"error": float(bench.error)}),
                 "varied": {v.name: [v.distribution.text, v.together] for v in self.varied},
                 "correlation": {" and ".join(pair): r for pair, r in self.correlations.items()},
                 "faults": [[each.name, each.value, each.is_present] for each in self.faults],

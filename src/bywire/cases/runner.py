@@ -73,6 +73,8 @@ def as_completed(
 ) -> Iterator[tuple[K, T]]:
     """Return the results of a pool in the order in which pieces finish.
 
+    If a piece fails, those that have finished by then come first, so that none is lost.
+
     Parameters
     ----------
     pool
@@ -91,7 +93,7 @@ def as_completed(
         while begun:
             done, _ = wait(begun, return_when=FIRST_COMPLETED)
             begun.update({pool.submit(compute, piece): piece for piece in islice(left, len(done))})
-            for each in done:
+            for each in sorted(done, key=lambda future: future.exception() is not None):
                 yield begun.pop(each), each.result()
 
     return finished()

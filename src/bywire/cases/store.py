@@ -176,7 +176,10 @@ class PieceFolder(ABC):
         FileError
             If the file cannot be written.
         """
-        path = self.path(number)
+        self.keep_at(self.path(number), write)
+
+    def keep_at(self, path: Path, write: Callable[[Path], object]) -> None:
+        """Write a file of the folder, completely or not at all; see `keep_file`."""
         try:
             with replacing(path) as fresh:
                 write(fresh)

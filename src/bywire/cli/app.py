@@ -268,7 +268,7 @@ class StudyGroup(TyperGroup):
 
 _ORDER = """
 list, run, compare, page, serve, reproduce, benchmark, linearize, frequency-response, agreement,
-margins, life, faults, design, convert, identify, replay, check, new,
+margins, life, procedure, faults, signoff, design, convert, identify, replay, check, new,
 study run, study resume, study extend, study report, study status, study surrogate, study size,
 export controller, export fmu, export wasm
 """

@@ -200,7 +200,7 @@ def show(
     if interrupted:
         kept = f". Finished results are in {out}" if out else ""
         output.message(f"interrupted{answer.partial and f': {answer.partial}'}{kept}")
-    elif out is not None:
+    elif out is not None and document.has_files:
         written = [f"written: {path}" for path in files]
         for line in [f"report: {out / document.page_name}"] if document.is_paged else written:
             output.message(line)

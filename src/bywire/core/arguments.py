@@ -8,8 +8,7 @@ import os
 import reprlib
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache, wraps
-from importlib import import_module
+from functools import cache, partial, wraps
 from numbers import Real
 from types import UnionType
 from typing import Any, TypeVar, get_args
@@ -173,7 +172,7 @@ def _kind(part: str, known: Mapping[str, Any]) -> _Kind | None:
     if meant is None:  # the module imports the library only when the function is called
         meant = getattr(sys.modules.get("bywire"), name, None)
     if meant is None and name.startswith("xr."):
-        meant = getattr(import_module("xarray"), name[3:], None)
+        return f"a {name[3:]}", partial(_is_of_xarray, name[3:])
     kinds = get_args(meant) if isinstance(meant, UnionType) else (meant,)
     if meant is Any or not all(isinstance(k, type) for k in kinds):
         return None
@@ -182,6 +181,13 @@ def _kind(part: str, known: Mapping[str, Any]) -> _Kind | None:
     names = [k.__name__ for k in kinds]
     words = " or ".join(f"a{'n' if each[0] in 'AEIOU' else ''} {each}" for each in names)
     return words, lambda value: isinstance(value, kinds)
+
+
+def _is_of_xarray(name: str, value: object) -> bool:
+    if getattr(value, "stands_for", "") == name:  # has the type's interface
+        return True
+    xarray = sys.modules.get("xarray")  # no value has xarray's type unless xarray is loaded
+    return xarray is not None and isinstance(value, getattr(xarray, name))
 
 
 def _is_whole(value: object) -> bool:

@@ -15,7 +15,7 @@ from functools import cache, cached_property, lru_cache, partial
 from itertools import chain
 from operator import attrgetter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast, overload
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt, MultipleOf
@@ -34,6 +34,7 @@ from bywire.core.errors import (
     unknown_name,
 )
 from bywire.core.quantities import Unit, display_unit, readable_unit
+from bywire.core.several import DifferError, Several
 from bywire.core.units import Written, convert, shown, split, written_unit
 
 if TYPE_CHECKING:
@@ -57,6 +58,11 @@ class Leaf:
         """Return whether a value [SI] is in the valid range."""
         above = value > self.low if self.low_open else value >= self.low
         return above and (value < self.high if self.high_open else value <= self.high)
+
+    def admit(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether each value [SI] is in the valid range."""
+        above = values > self.low if self.low_open else values >= self.low
+        return above & (values < self.high if self.high_open else values <= self.high)
 
     @property
     def range_text(self) -> str:
@@ -197,11 +203,47 @@ class Places(NamedTuple):
         rules = None if self.fields else _rules(type(node))
         if rules is None:
             return type(node).model_validate(fields)
-        copy = type(node).__new__(type(node))
-        copy.__setstate__({**node.__getstate__(), "__dict__": fields})  # as pydantic's copy
-        for rule in rules:
-            copy = getattr(copy, rule)()
-        return copy
+        return _ruled(node, fields, rules)
+
+    def joined(self, node: S, values: Mapping[str, Several]) -> S:
+        """Return a set with the numbers of several cases, and check the rules of its groups.
+
+        Raises
+        ------
+        DifferError
+            When the groups have other validators than rules, or the cases differ in a rule.
+        ValueError, AssertionError
+            When a rule rejects all cases.
+        """
+        fields, rules = fields_of(node), _rules(type(node))
+        bounded = all(_is_bound(note) for name, _ in self.fields for note in _notes(node, name))
+        if rules is None or not bounded:
+            raise DifferError(f"{type(node).__qualname__} needs single numbers")
+        for name, inner in self.groups:
+            fields[name] = inner.joined(fields[name], values)
+        for name, dotted in self.fields:
+            fields[name] = values[dotted]
+        return _ruled(node, fields, rules)
+
+
+def _ruled(node: S, fields: dict[str, Any], rules: Sequence[str]) -> S:
+    """Return a copy of a set with other fields, after its rules."""
+    copy = type(node).__new__(type(node))
+    copy.__setstate__({**node.__getstate__(), "__dict__": fields})  # as pydantic's copy
+    for rule in rules:
+        copy = getattr(copy, rule)()
+    return copy
+
+
+def _notes(node: BaseModel, field: str) -> Sequence[Any]:
+    """Return the constraints and other notes of a field."""
+    return type(node).model_fields[field].metadata
+
+
+def _is_bound(note: Any) -> bool:
+    """Return whether a note is a unit, or a constraint that `Leaf` describes."""
+    has_only_finite = vars(note) == {"allow_inf_nan": False} if hasattr(note, "__dict__") else False
+    return isinstance(note, (Unit, Gt, Ge, Lt, Le)) or has_only_finite
 
 
 @cache
@@ -409,6 +451,34 @@ class ParameterSet(BaseModel):
             }
         return copy
 
+    def with_columns(self, columns: Mapping[str, NDArray[np.float64]]) -> Self:
+        """Return a set with the numbers of several cases, checked as in `replace`.
+
+        Parameters
+        ----------
+        columns
+            Value in each case [SI] by dotted name, shape (cases,) each.
+
+        Raises
+        ------
+        DifferError
+            When a value is invalid, or when only single numbers can be checked.
+        """
+        leaves = leaf_fields(type(self))
+        for name, column in columns.items():
+            leaf = leaves.get(name)
+            if leaf is None or leaf.is_whole or type(self.value(name)) is not float:
+                raise DifferError(f"{name} is not a number")
+            is_valid = leaf.admit(column) & np.isfinite(column)
+            if not is_valid.all():
+                raise DifferError(f"{name} is invalid in some cases", is_valid)
+        try:
+            places = _places(type(self), tuple(columns))
+            joined = places.joined(self, {n: Several(c) for n, c in columns.items()})
+            return cast(Self, _with_objects(joined))
+        except (ValueError, AssertionError) as error:
+            raise DifferError(f"a rule rejects all cases ({error})") from None
+
     def flat(self) -> dict[str, Any]:
         """Return all leaves and choices by dotted name."""
         return dict(self._by_name("values"))
@@ -470,9 +540,47 @@ def leaf_table(pars: Sequence[ParameterSet]) -> NDArray[np.float64]:
     TypeError, ValueError
         When they contain objects other than numbers.
     """
+    if isinstance(pars, ParameterTable):
+        return pars.table
     each = [par._by_name("numbers").values() for par in pars]
     shape = (len(each), len(each[0]))
     return np.fromiter(chain.from_iterable(each), np.float64, math.prod(shape)).reshape(shape)
+
+
+class ParameterTable(Sequence[ParameterSet]):
+    """Sets of the same structure as rows of a table, built on demand.
+
+    Parameters
+    ----------
+    first
+        The first set.
+    table
+        Numbers of all sets, shape (sets, leaves); see `ParameterSet.leaves`.
+    build
+        ``build(k)``: one of the sets.
+    """
+
+    def __init__(
+        self,
+        first: ParameterSet,
+        table: NDArray[np.float64],
+        build: Callable[[int], ParameterSet],
+    ) -> None:
+        self.first, self.table, self._build = first, table, build
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    @overload
+    def __getitem__(self, k: int) -> ParameterSet: ...
+
+    @overload
+    def __getitem__(self, k: slice) -> Sequence[ParameterSet]: ...
+
+    def __getitem__(self, k: int | slice) -> ParameterSet | Sequence[ParameterSet]:
+        if isinstance(k, slice):
+            return [self[each] for each in range(len(self))[k]]
+        return self.first if k == 0 else self._build(range(len(self))[k])
 
 
 @cache

@@ -22,6 +22,26 @@ def row_by_row(watch: F) -> F:
     return watch
 
 
+def within_limits(watch: F) -> F:
+    """Declare that an element's ``watch`` compares each input with limits, as `row_by_row`.
+
+    The limits follow from parameters alone. So it warns if and only if it would warn about the
+    lowest and highest values of its inputs, and studies on a graphics processor fetch no rows.
+    """
+    watch.within_limits = True  # type: ignore[attr-defined]
+    return row_by_row(watch)
+
+
+def outline(rows: Any, name: str) -> Any:
+    """Return the first, lowest, highest and last values of a signal, or all if these are unknown.
+
+    ``rows``: signals of shape (cases, rows). A limit is exceeded by all values if it is exceeded by
+    one of these.
+    """
+    known = rows.outline(name) if hasattr(type(rows), "outline") else None
+    return rows[name].values if known is None else known
+
+
 def outside(values: Any, low: float, high: float) -> Any:
     """Return which values are outside a range; NaN is treated as inside."""
     return np.logical_or(np.less(values, low), np.greater(values, high))

@@ -7,6 +7,7 @@ recording.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
 
@@ -83,6 +84,7 @@ class Watching(Model):
 
 
 _Felt = tuple[tuple[Any, dict[str, Any]], ...]
+_MONOTONIC = (operator.add, operator.sub, operator.mul, operator.neg, operator.pos)
 _KNOWN: dict[Any, _Felt] = {}
 
 
@@ -107,15 +109,57 @@ def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
         if hasattr(part.element.watch, "row_by_row")
     )
     joined = _joined(pars)
-    silent = set()
-    for each in felt:
-        try:
-            ((part, texts),) = _warnings_by_part(model, (each,), rows, joined, len(pars) > 1)
-        except (TypeError, ValueError):  # the function needs or returns more than a single number
-            continue
-        if not texts:
-            silent.add(part.name)
-    return frozenset(silent)
+    outlined = rows.outlined() if hasattr(type(rows), "outlined") else None
+    return frozenset(
+        each[0].name
+        for each in felt
+        if (_is_outlined(each, outlined) and _is_silent(model, each, outlined, joined, pars))
+        or _is_silent(model, each, rows, joined, pars)
+    )
+
+
+def _is_silent(
+    model: Any, each: tuple[Any, dict[str, Any]], rows: Any, joined: Any, pars: Sequence[Any]
+) -> bool:
+    """Return whether a part has no warnings in any of several cases."""
+    try:
+        ((_, texts),) = _warnings_by_part(model, (each,), rows, joined, len(pars) > 1)
+    except (TypeError, ValueError):  # the function needs or returns more than a single number
+        return False
+    return not texts
+
+
+def _is_outlined(each: tuple[Any, dict[str, Any]], outlined: Any) -> bool:
+    """Return whether the lowest and highest values of signals determine a part's warnings.
+
+    This requires inputs that follow from one signal each, by operations that rise or fall with it.
+    """
+    part, inputs = each
+    if outlined is None or not hasattr(part.element.watch, "within_limits"):
+        return False
+    values = [one for value in inputs.values() for one in (value if _is_tuple(value) else (value,))]
+    signals = {name for value in values for name in names_in(value) if _PARAMETER not in name[:1]}
+    return all(map(_rises_or_falls, values)) and all(
+        name not in outlined or np.isfinite(outlined[name].values).all() for name in signals
+    )
+
+
+def _is_tuple(value: Any) -> bool:
+    return isinstance(value, tuple)
+
+
+def _rises_or_falls(value: Any) -> bool:
+    """Return whether a number is a monotonic function of at most one signal, also when rounded."""
+    if not isinstance(value, Traced) or value.operation is None:
+        return not _is_tuple(value)
+    if value.operation not in _MONOTONIC:
+        return _signals_in(value) == 0
+    several = sum(_signals_in(each) > 0 for each in value.inputs) > 1
+    return not several and all(map(_rises_or_falls, value.inputs))
+
+
+def _signals_in(value: Any) -> int:
+    return sum(not name.startswith(_PARAMETER) for name in names_in(value))
 
 
 def _joined(pars: Sequence[Any]) -> Any:

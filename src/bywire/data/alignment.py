@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core import units
@@ -22,6 +21,9 @@ from bywire.data.channel_quality import (
     quality,
 )
 from bywire.data.file_format import room
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 METHODS = ("linear", "previous", "nearest", "average")
 """methods for values between samples"""
@@ -159,6 +161,9 @@ def resample(
     UnknownNameError
         For an unknown signal, method or flaw.
     """
+    import pandas as pd  # slow to load, like xarray
+    import xarray as xr
+
     step = _positive(interval, "interval")
     longest = None if max_gap is None else _positive(max_gap, "max_gap")
     left_out = _flaws(exclude)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core.typing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Labeled = tuple[Any, str, str]
 """values, unit and label"""
@@ -31,6 +33,8 @@ def labeled(axes: Mapping[str, Labeled], variables: Mapping[str, Labeled]) -> xr
     >>> data["i"].attrs
     {'units': 'A', 'long_name': 'current'}
     """
+    import xarray as xr  # slow to load
+
     dims = tuple(axes)
     return xr.Dataset(
         {
@@ -70,6 +74,8 @@ def over(
         return labeled(
             {name: (places, *attributes)}, {n: (c, unit, label) for n, c in columns.items()}
         )
+    import xarray as xr  # slow to load
+
     kind, labels = branches
     own = np.ndim(places) > 1
     dims = (kind, along if own else name)

@@ -13,11 +13,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import pandas as pd
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core import units
@@ -31,6 +29,9 @@ from bywire.data.file_format import ReadOptions, Source, require_room, room
 from bywire.data.format_registry import FORMATS, format_to_read, head_of
 from bywire.data.limited_source import limited
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping, mapping_from, read_mapping
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _BLOCK = 1 << 20  # times per chunk, since their differences need memory
 
@@ -293,6 +294,9 @@ def mapping_of(
 def _dataset(
     file: Path, source: Source, chosen: Sequence[Chosen], progress: Progress
 ) -> tuple[xr.Dataset, list[str]]:
+    import pandas as pd  # slow to load, like xarray
+    import xarray as xr
+
     clocks = [c.clock.column for c in chosen if c.clock.column]
     names = list(dict.fromkeys([*clocks, *(c.column for c in chosen)]))
     values = source.read(names, progress)

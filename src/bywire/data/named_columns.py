@@ -6,8 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from bywire.core.callers import is_command_line, option
 from bywire.core.errors import FileError, InputError, ParameterError, UnitError, unknown_name
@@ -24,6 +23,9 @@ from bywire.data.column_units import split_title
 from bywire.data.file_format import room
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 from bywire.data.measurement import dataset_of, opened
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _BRACKETS = "each with its column's unit in the brackets, or 1 for a pure number"
 

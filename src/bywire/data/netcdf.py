@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core.arguments import checked
@@ -26,6 +25,8 @@ from bywire.data.formats.netcdf import FORMAT as NETCDF
 from bywire.data.limited_source import limited
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from bywire.data.limited_source import LimitedSource
 
 _VALUES = 1 << 22  # numbers per message
@@ -53,11 +54,11 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
         When the file cannot be written, for example because the disk is full.
     """
     path = Path(path)
-    encoding = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
+    write = _write_rows if _are_plain_rows(recording) else _write_dataset
     try:
         # Ctrl-C could leave one of xarray's locks locked, so closing would wait forever.
         with replacing(path) as fresh, interrupts_deferred():
-            recording.to_netcdf(fresh, engine="netcdf4", encoding=encoding)
+            write(recording, fresh)
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
@@ -65,6 +66,38 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
             name=str(path),
         ) from None
     return path
+
+
+_PACKED = {"zlib": True, "complevel": 1}
+
+
+def _write_dataset(recording: xr.Dataset, path: Path) -> None:
+    encoding = dict.fromkeys(map(str, recording.data_vars), _PACKED)
+    recording.to_netcdf(path, engine="netcdf4", encoding=encoding)
+
+
+def _are_plain_rows(recording: xr.Dataset) -> bool:
+    """Return whether a recording is not a dataset but plain rows of numbers over time."""
+    if not hasattr(recording, "stands_for"):
+        return False
+    return all(row.values.dtype == np.float64 for row in recording.variables.values())
+
+
+def _write_rows(recording: xr.Dataset, path: Path) -> None:
+    """Write the file that xarray would write; loading xarray takes as long as half of a run."""
+    import netCDF4
+
+    with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+        for name, value in recording.attrs.items():
+            texts = np.asarray(value)
+            is_list = texts.dtype.kind == "U" and texts.size > 1
+            (file.setncattr_string if is_list else file.setncattr)(name, value)
+        file.createDimension("time", recording.sizes["time"])
+        for name, row in recording.variables.items():
+            packed: dict[str, Any] = _PACKED if name in recording.data_vars else {}
+            variable = file.createVariable(str(name), "f8", ("time",), fill_value=np.nan, **packed)
+            variable.setncatts(row.attrs)
+            variable[...] = row.values
 
 
 @checked
@@ -165,6 +198,8 @@ def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _dataset(source: LimitedSource) -> xr.Dataset:
+    import xarray as xr  # slow to load
+
     columns = source.read(list(source.columns), silent)
     variables = {}
     for name, described in source.notes["variables"].items():
@@ -187,6 +222,8 @@ def _dataset(source: LimitedSource) -> xr.Dataset:
 
 @contextmanager
 def _open(path: Path, options: ReadOptions) -> Iterator[RecordingSource]:
+    import xarray as xr  # slow to load
+
     # Not open_dataset: its indexes, not needed here, load libraries for other array types. This
     # would happen after each fork, for every file, and take half a second.
     store = xr.backends.NetCDF4DataStore.open(path)  # type: ignore[no-untyped-call]
@@ -207,7 +244,7 @@ FORMAT = FileFormat(
     _open,
     NETCDF.write,
     has_many_axes=True,
-    libraries=("netCDF4",),
+    libraries=("netCDF4", "xarray"),
     counts=("index", 0),
 )
 """format for recordings in the child process; measurement files have the format ``netcdf``"""

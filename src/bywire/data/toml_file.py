@@ -20,6 +20,8 @@ LARGEST = 1_000_000
 _KEY_PARTS = 16
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_KEY_PARTS}}}")
+_ENTRY = re.compile(r"[ \t]*\[\[[ \t]*([\w-]+)[ \t]*\]\]")
+_TRIPLE = re.compile(r'"""|\'\'\'')
 _ADVICE = "check the path"
 
 
@@ -67,6 +69,35 @@ def read_toml(
     return content
 
 
+def entry_lines(file: Path) -> dict[str, list[int]]:
+    """Return the lines at which the entries of arrays of tables start, by the array's name.
+
+    Only for errors: the lines are those of ``[[NAME]]`` outside multi-line strings.
+    """
+    lines: dict[str, list[int]] = {}
+    closing = ""
+    for number, line in enumerate(_text(file, "file", _no_idea, "").splitlines(), start=1):
+        if not closing and (match := _ENTRY.match(line)):
+            lines.setdefault(match[1], []).append(number)
+        closing = _closing_after(line, closing)
+    return lines
+
+
+def _closing_after(line: str, closing: str) -> str:
+    """Return the quotation marks that end the multi-line string at the end of a line; or empty."""
+    rest = line
+    while True:
+        if closing:
+            _, found, rest = rest.partition(closing)
+            if not found:
+                return closing
+            closing = ""
+        match = _TRIPLE.search(rest)
+        if match is None or "#" in rest[: match.start()]:
+            return ""
+        closing, rest = match[0], rest[match.end() :]
+
+
 def _require_numbers(value: Any, file: Path, key: str) -> None:
     """Reject integers beyond the range of floating point, at any depth."""
     if isinstance(value, dict):
@@ -86,19 +117,7 @@ def _require_numbers(value: Any, file: Path, key: str) -> None:
 
 
 def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str) -> str:
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
-        hint = missing(file) if isinstance(error, FileNotFoundError) else _ADVICE
-        raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
-    if len(data) > LARGEST:
-        raise FileError(
-            f"{file} is larger than {LARGEST // 1000} kB, which is too large for a {kind}"
-            f"{too_large}",
-            name=str(file),
-        )
+    data = limited_bytes(file, kind, missing=missing, too_large=too_large)
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError:
@@ -109,17 +128,75 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
         ) from None
 
 
+def limited_bytes(
+    file: Path,
+    kind: str,
+    most: int = LARGEST,
+    *,
+    missing: Callable[[Path], str] = _no_idea,
+    too_large: str = "",
+) -> bytes:
+    """Return the content of a file of limited size.
+
+    Parameters
+    ----------
+    file
+        Path of the file.
+    kind
+        Its name in errors.
+    most
+        Maximum size in bytes.
+    missing, too_large
+        Next steps, see `read_toml`.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read or is too large.
+    """
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(most + 1)
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
+        hint = missing(file) if isinstance(error, FileNotFoundError) else _ADVICE
+        raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
+    if len(data) > most:
+        raise FileError(
+            f"{file} is larger than {most // 1000} kB, which is too large for a {kind}{too_large}",
+            name=str(file),
+        )
+    return data
+
+
 # --- Kinds of files
 
 BENCH, STUDY, LIFE, CAMPAIGN = "bench", "study", "life", "campaign"
+PROCEDURE, SIGNOFF = "procedure", "sign-off"
 _COMMANDS = {
     BENCH: "bywire run",
     STUDY: "bywire study run",
     LIFE: "bywire life",
     CAMPAIGN: "bywire faults",
+    PROCEDURE: "bywire procedure",
+    SIGNOFF: "bywire signoff",
 }
-_WORDS = {BENCH: "a bench", STUDY: "a study", LIFE: "a life", CAMPAIGN: "a fault campaign"}
-HEADS = {BENCH: "experiment", STUDY: "bench", LIFE: "life", CAMPAIGN: "bench"}
+_WORDS = {
+    BENCH: "a bench",
+    STUDY: "a study",
+    LIFE: "a life",
+    CAMPAIGN: "a fault campaign",
+    PROCEDURE: "a procedure",
+    SIGNOFF: "a sign-off",
+}
+HEADS = {
+    BENCH: "experiment",
+    STUDY: "bench",
+    LIFE: "life",
+    CAMPAIGN: "bench",
+    PROCEDURE: "procedure",
+    SIGNOFF: "requirement",
+}
 """required key of each kind"""
 _OF_CAMPAIGNS = ("campaign", "criteria")
 _NEVER_IN_STUDIES = {*_OF_CAMPAIGNS, "values", "residuals", "rates", "reaction"}
@@ -135,8 +212,12 @@ def kind_of(content: Mapping[str, Any]) -> str:
     ('bench', 'study')
     """
     keys = content.keys()
+    if keys & {"requirement", "evidence"}:
+        return SIGNOFF
     if "life" in keys:
         return LIFE
+    if "procedure" in keys:
+        return PROCEDURE
     if "bench" not in keys:
         return BENCH if "experiment" in keys else ""
     if not keys & _NEVER_IN_STUDIES:
@@ -161,7 +242,7 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     content
         Content of the file.
     wanted
-        `BENCH`, `STUDY`, `LIFE` or `CAMPAIGN`.
+        `BENCH`, `STUDY`, `LIFE`, `CAMPAIGN`, `PROCEDURE` or `SIGNOFF`.
     file
         Path of the file.
 
@@ -172,8 +253,9 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     """
     kind = kind_of(content)
     head = HEADS[wanted]
-    if not kind or kind == wanted or (head in content and head != HEADS[kind]):
-        return
+    has_head = head in content and head != HEADS[kind] if kind else False
+    if not kind or kind == wanted or (has_head and kind != PROCEDURE):
+        return  # a procedure also names an experiment, like a bench
     raise ParameterError(
         f"this is {_WORDS[kind]}, not {_WORDS[wanted]}. Use '{_COMMANDS[kind]} {file}'",
         name=str(file),

@@ -6,9 +6,9 @@ import contextlib
 from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.arguments import checked
 from bywire.core.callers import option
@@ -17,6 +17,9 @@ from bywire.core.scratch import replacing
 from bywire.core.typing import Progress, silent
 from bywire.data.file_format import FileFormat
 from bywire.data.format_registry import format_to_write
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @checked

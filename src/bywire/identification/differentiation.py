@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, counted, not_valid
 from bywire.core.typing import Array
 from bywire.identification.measured import require_signals
 from bywire.identification.output_error import even_interval
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _ORDER = 4
 _STENCIL = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0  # reversed, for convolve

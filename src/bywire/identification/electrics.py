@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.errors import ParameterError
 from bywire.core.model import Model
@@ -33,6 +32,9 @@ from bywire.identification.residuals import explained
 from bywire.identification.unknown import parameters_of
 from bywire.plant import anti_alias_filter, dc_motor
 from bywire.simulation.run import Run, simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _AGAINST = -0.5  # correlation of demand and current below which one has the wrong sign
 _EXPLAINED = 0.5  # minimum fraction of the variance: as much as the residual

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from threading import Lock
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core.errors import ModelError, ParameterError, unknown_name
@@ -28,6 +27,9 @@ from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 from bywire.simulation.native import BufferedCall
 from bywire.simulation.symbols import SX, column, scalars
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)

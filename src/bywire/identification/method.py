@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from bywire.bench.bench import Bench
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Progress
 from bywire.identification.estimate import Estimate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,9 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core.arguments import checked
@@ -29,6 +28,9 @@ from bywire.identification.measured import require_signals
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Start = Callable[[Mapping[str, float]], tuple[Any, Any]]
 """``start(values) -> (state, memory)``: start of a run with changed parameters and start options

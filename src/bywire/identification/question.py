@@ -6,10 +6,9 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.bench import Bench
@@ -28,6 +27,9 @@ from bywire.identification.least_squares import Loss
 from bywire.identification.method import METHODS, Method
 from bywire.identification.output_error import Between
 from bywire.identification.unknown import Unknown, parameters_of, scattered
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Texts = Mapping[str, str] | Iterable[str]
 """text for each name; or the names alone"""

@@ -9,10 +9,9 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -33,6 +32,9 @@ from bywire.core.section import Hint, Section
 from bywire.core.typing import Array
 from bywire.data.alignment import resample
 from bywire.data.toml_file import read_toml
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _LEAST = 8  # samples in which two shifted signals must overlap to be compared
 

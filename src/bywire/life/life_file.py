@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -15,11 +15,13 @@ from pydantic import Field
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.bench.step_choice import spread_over, with_chosen_step
 from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Section, Table
+from bywire.core.typing import Progress
 from bywire.core.values import parsed, require_units
 from bywire.data.toml_file import LIFE, read_toml, require_kind
 from bywire.life.declaration import LIVES, Life, StopConditions
@@ -85,6 +87,25 @@ class LifePlan:
         laws = [each.distribution for each in self.varied]
         drawn = Sampled("latin-hypercube", self.seed, laws).values(0, self.stops)
         return {each.name: v for each, v in zip(self.varied, drawn, strict=True)}
+
+    def with_step(self, progress: Progress | None = None) -> LifePlan:
+        """Return the plan with the step for the error that its bench states, if it states one.
+
+        The stops of the new brake decide.
+
+        Raises
+        ------
+        StepError
+            When no step meets the error.
+        RunError
+            When the bench fails.
+        """
+        stops = [
+            {n: v[k].item() for n, v in self.population.items() if not n.startswith(CONDITION)}
+            for k in self.different[0]
+        ]
+        bench = with_chosen_step(self.bench, spread_over(stops), progress)
+        return self if bench is self.bench else replace(self, bench=bench)
 
     @property
     def count(self) -> int:
@@ -175,10 +196,9 @@ def _plan(content: Mapping[str, Any], name: str, overrides: Mapping[str, str]) -
     file = LifeFile.read({"name": name, **content}, "a life file")
     life = LIVES.find(file.life)
     changes = _texts(bench_file.flattened(file.set)) | dict(overrides)
-    bench = bench_file.read(
-        life.experiment,
-        {**life.settings, **{k: v for k, v in changes.items() if not _is_of_life(k)}},
-    )
+    of_bench = {k: v for k, v in changes.items() if not _is_of_life(k)}
+    settings = bench_file.without_replaced(life.settings, of_bench, "simulation.")
+    bench = bench_file.read(life.experiment, {**settings, **of_bench})
     conditions = CONDITIONS.replace(_given(StopConditions, changes, CONDITION))
     wear = life.defaults().replace(_given(life.wear, changes, WEAR))
     population = {k: v for k, v in life.population.items() if k not in changes}

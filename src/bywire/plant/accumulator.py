@@ -19,7 +19,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Pressure, Unit
 from bywire.core.signals import Energy, Power, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import first, row_by_row
+from bywire.core.validity import first, within_limits
 from bywire.plant import brake_fluid
 
 Stiffness = Annotated[float, Unit("Pa/m**3", 1e11), Field(gt=0, allow_inf_nan=False)]
@@ -139,7 +139,7 @@ def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters)
     return brake_fluid.convected_power(u.q, pressure(x, par, fluid), fluid)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
     """Warn if the accumulator is full."""
     return first(t, par.V_max < x.V, "the accumulator is full (V_max)")

@@ -21,7 +21,7 @@ from bywire.core.signals import (
     Signal,
 )
 from bywire.core.typing import Array
-from bywire.core.validity import first, row_by_row
+from bywire.core.validity import first, within_limits
 
 GaugePressure = Annotated[float, Signal("Pa", "pressure", 2e6), Ge(0)]
 
@@ -64,7 +64,7 @@ FAULTS = (
 )
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, p: GaugePressure, par: Parameters, place: str) -> list[str]:
     """Warn if the absolute pressure at a place, such as "in the caliper", is below zero."""
     text = f"the absolute pressure {place} is below zero"

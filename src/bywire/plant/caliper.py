@@ -14,7 +14,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Area, Conductance, Nodes, Stiffness, Unit, Volume
 from bywire.core.signals import Energy, FluidCompliance, Power, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import row_by_row
+from bywire.core.validity import within_limits
 from bywire.plant import brake_fluid
 
 Expansion = Annotated[float, Unit("1/K", 7e-4), Field(ge=0, allow_inf_nan=False)]
@@ -198,7 +198,7 @@ def power_loss(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Powe
     return brake_fluid.convected_power(par.G_leak * x.p, x.p, fluid)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
     """Warn if the absolute pressure is below zero."""
     return brake_fluid.watch(t, x.p, fluid, "in the caliper")

@@ -17,7 +17,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Area, Conductance, Damping, Mass, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import row_by_row
+from bywire.core.validity import within_limits
 from bywire.plant import brake_fluid
 
 FluidVolume = Annotated[float, Unit("m**3", 1e-5), Field(gt=0, allow_inf_nan=False)]
@@ -127,7 +127,7 @@ def power_loss(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Loss
     return par.d * x.v * x.v + leak
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
     """Warn if the absolute pressure is below zero."""
     return brake_fluid.watch(t, x.p, fluid, "in the caliper")

@@ -11,7 +11,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import SignedCurrent
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
-from bywire.core.validity import first, outside, row_by_row
+from bywire.core.validity import first, outside, within_limits
 
 MotorCurrent = Annotated[float, Signal("A", "motor current", 5.0)]
 Reading = Annotated[float, Signal("1", "reading, fraction of the range", 0.5)]
@@ -48,7 +48,7 @@ def value(share: Reading, par: Parameters) -> MotorCurrent:
     return par.i_low + share * (par.i_high - par.i_low)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, u: Input, par: Parameters) -> list[str]:
     """Warn if the current leaves the sensor's range, with the time when it first does."""
     text = f"the current leaves the sensor's range, {par.i_low:g} to {par.i_high:g} A,"

@@ -16,7 +16,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Resistance, Unit, Voltage
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import first, row_by_row
+from bywire.core.validity import first, within_limits
 
 Capacitance = Annotated[float, Unit("F", 1e-3), Field(gt=0, allow_inf_nan=False)]
 Amperes = Annotated[float, Signal("A", "current", 5.0)]
@@ -158,7 +158,7 @@ def power_loss(x: State, par: Parameters) -> Power:
     return supply_loss(x, par) + chopper_loss(x, par)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
     """Warn if the bus exceeds its maximum voltage."""
     cause = "" if par.law == "battery" else ", because the supply takes no current"

@@ -13,7 +13,7 @@ from bywire.core.quantities import Area, HeatCapacity, HeatConductance, Temperat
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.core.validity import first, row_by_row
+from bywire.core.validity import first, within_limits
 
 Convection = Annotated[float, Unit("W/(m**2*K)", 10.0), Field(ge=0, allow_inf_nan=False)]
 Cooling = Annotated[
@@ -230,7 +230,7 @@ def power_loss(x: State, u: Input, par: Parameters) -> Cooling:
     return out.disc_air + out.fluid_air
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
     """Warn if the fluid may boil, or if the discs exceed the valid range of the parameters."""
     if par.law == "off":

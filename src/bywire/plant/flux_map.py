@@ -32,7 +32,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Unit
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
-from bywire.core.validity import first, outside, row_by_row
+from bywire.core.validity import first, outside, within_limits
 
 SignedNodes = tuple[Annotated[float, Field(allow_inf_nan=False)], ...]
 Amperes = Annotated[float, Signal("A", "current", 5.0)]
@@ -372,7 +372,7 @@ def coenergy(i: Currents, par: Parameters) -> Coenergy:
     return at.sum(at.d.value, at.q.value) - zero.sum(zero.d.value, zero.q.value)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, i: Currents, par: Parameters) -> list[str]:
     """Warn if a current leaves the tables."""
     found: list[str] = []

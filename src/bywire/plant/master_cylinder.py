@@ -12,7 +12,7 @@ from bywire.core.quantities import Area, Damping, Length
 from bywire.core.signals import Energy, FluidCompliance, Power, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.core.validity import row_by_row
+from bywire.core.validity import within_limits
 from bywire.plant import brake_fluid
 
 Loss = Annotated[float, Signal("W", "fluid damping loss", role=Role("sink", "fluid damping"))]
@@ -126,7 +126,7 @@ def power_loss(u: Input, par: Parameters) -> Loss:
     return par.k_damp * u.v * u.v
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
     """Warn if the absolute pressure is below zero."""
     return brake_fluid.watch(t, x.p, fluid, "in the master cylinder")

@@ -21,7 +21,7 @@ from bywire.core.quantities import (
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.core.validity import first, row_by_row
+from bywire.core.validity import first, within_limits
 
 BOOK = "motor heat"
 COPPER = Role("source", "copper", book=BOOK)
@@ -181,7 +181,7 @@ def cold(par: Parameters) -> State:
     return State(par.T_a, par.T_a)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
     """Warn if the winding exceeds its insulation limit."""
     if par.law == "off":

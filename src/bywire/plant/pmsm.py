@@ -11,7 +11,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import FluxLinkage, Inductance, PolePairs, Resistance, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import row_by_row
+from bywire.core.validity import within_limits
 from bywire.plant import flux_map
 
 Hysteresis = Annotated[float, Unit("W/(V**2*s)", 10.0), Field(ge=0, allow_inf_nan=False)]
@@ -236,7 +236,7 @@ def iron_loss(x: State, omega: MotorSpeed, par: Parameters) -> IronLoss:
     return 0.0 * omega if par.iron == "off" else _eddy_slope(x, par) * omega * omega
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
     """Warn if the currents leave the flux map."""
     if par.law == "linear":

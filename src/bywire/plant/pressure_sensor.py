@@ -12,7 +12,7 @@ from bywire.core.quantities import SignedPressure
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.core.validity import first, outside, row_by_row
+from bywire.core.validity import first, outside, within_limits
 
 AbsolutePressure = Annotated[float, Signal("Pa", "absolute pressure", 2e6)]
 Reading = Annotated[float, Signal("1", "reading, fraction of the range", 0.5)]
@@ -53,7 +53,7 @@ def value(share: Reading, par: Parameters) -> AbsolutePressure:
     return par.p_low + share * (par.p_high - par.p_low)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, u: Input, par: Parameters) -> list[str]:
     """Warn if the pressure leaves the sensor's range, with the time when it first does."""
     span = f"{par.p_low / 1e5:g} to {par.p_high / 1e5:g} bar absolute"

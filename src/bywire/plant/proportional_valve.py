@@ -31,7 +31,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Unit
 from bywire.core.signals import Energy, Power, Pressure, Role, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import first, outside, row_by_row
+from bywire.core.validity import first, outside, within_limits
 from bywire.plant import brake_fluid, orifice
 
 ValveLift = Annotated[float, Unit("m", 2e-4), Field(gt=0, allow_inf_nan=False)]
@@ -200,7 +200,7 @@ def throttling(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameter
     return orifice.power_loss(_through(x, u, par), par.seat, fluid)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
     """Warn if seat or stop are missing or too soft."""
     beyond = outside(x.x, -0.5 * par.lift, 1.5 * par.lift)

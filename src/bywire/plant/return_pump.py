@@ -24,7 +24,7 @@ from bywire.core.quantities import Conductance, Length, Unit, Volume
 from bywire.core.signals import Energy, Power, Pressure, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.core.validity import highest, row_by_row
+from bywire.core.validity import highest, within_limits
 from bywire.plant import brake_fluid, check_valve
 
 Phase = Annotated[float, Unit("rad", 1.0), Field(allow_inf_nan=False)]
@@ -269,7 +269,7 @@ def power_loss(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameter
     return power_in(x, u, par, fluid) - fluid.p_atm * void(x, u, par).slope * opens
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> list[str]:
     """Warn if the delivery pressure exceeds the permitted one, or suction is below vacuum."""
     texts = brake_fluid.watch(t, u.p_s, fluid, "at the pump's suction")

@@ -24,7 +24,7 @@ from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Inductance, Resistance, Unit, Weight
 from bywire.core.signals import Energy, Power, Pressure, Role, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import first, row_by_row
+from bywire.core.validity import first, within_limits
 from bywire.plant import brake_fluid, orifice
 
 Travel = Annotated[float, Unit("m", 2e-4), Field(gt=0, allow_inf_nan=False)]
@@ -261,7 +261,7 @@ def throttling(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameter
     return orifice.power_loss(_through(x, u, par), par.seat, fluid)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
     """Warn if seat or stop are missing or too soft."""
     after = ". Connect an end_stop from travel_ends.near to .far, or make it stiffer"

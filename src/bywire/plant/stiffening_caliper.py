@@ -14,7 +14,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Pressure, Unit, Volume
 from bywire.core.signals import Energy, FluidCompliance, Power, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import row_by_row
+from bywire.core.validity import within_limits
 from bywire.plant import brake_fluid
 
 Compliance = Annotated[float, Unit("m**3/Pa", 1e-13), Field(gt=0, allow_inf_nan=False)]
@@ -88,7 +88,7 @@ def power_in(x: State, u: Input, fluid: brake_fluid.Parameters) -> Power:
     return brake_fluid.convected_power(u.q, x.p, fluid)
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, fluid: brake_fluid.Parameters) -> list[str]:
     """Warn if the absolute pressure is below zero."""
     return brake_fluid.watch(t, x.p, fluid, "in the caliper")

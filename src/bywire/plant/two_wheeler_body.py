@@ -13,7 +13,7 @@ from bywire.core.quantities import Duration, Length, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.core.validity import first, highest, row_by_row
+from bywire.core.validity import first, highest, within_limits
 
 BodyMass = Annotated[float, Unit("kg", 250.0), Field(gt=0, allow_inf_nan=False)]
 BodyInertia = Annotated[float, Unit("kg*m**2", 35.0), Field(ge=0, allow_inf_nan=False)]
@@ -246,7 +246,7 @@ def power_loss(x: State, par: Parameters) -> Drag:
     return drag(x, par) * x.v
 
 
-@row_by_row
+@within_limits
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
     r"""Warn if the body falls over its front wheel.
 

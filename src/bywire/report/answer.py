@@ -8,9 +8,12 @@ import math
 import os
 import sys
 from abc import ABC, abstractmethod
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
+from bywire.bench.kpis.kpi import Kpi
 from bywire.core.arguments import require_kinds
 from bywire.core.errors import unknown_name
 from bywire.report.document import Document, FigureBlock, TableBlock
@@ -20,6 +23,38 @@ from bywire.report.tables import Table
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+
+Outcome = Literal["missed", "not shown", "undecided", "met"]
+"""verdicts, the worst first; ``not shown`` if a result judges nothing"""
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
+
+
+@dataclass(frozen=True)
+class FigureAt:
+    """Key figure of a result, on which a requirement can be judged.
+
+    Parameters
+    ----------
+    kpi
+        The figure with its value, unit and numerical error.
+    at
+        Where it applies, for example ``"motor.R_m = 0.35 ohm"``. Empty if the result has only one.
+    """
+
+    kpi: Kpi
+    at: str = ""
+
+
+def outcome_of(outcomes: Collection[str]) -> Outcome:
+    """Return the worst of several verdicts; ``not shown`` if there are none.
+
+    Examples
+    --------
+    >>> outcome_of(["met", "undecided"]), outcome_of([])
+    ('undecided', 'not shown')
+    """
+    return next((each for each in OUTCOMES if each in outcomes), "not shown")
 
 
 class AnswerWarning(UserWarning):
@@ -57,6 +92,16 @@ class Answer(ABC):
     def holds(self) -> bool:
         """Whether all requirements and checks are met; otherwise commands exit with 1."""
         return True
+
+    @property
+    def key_figures(self) -> list[FigureAt]:
+        """Key figures on which requirements can be judged. Default: none."""
+        return []
+
+    @property
+    def outcome(self) -> Outcome:
+        """Verdict on the result's own requirements and checks."""
+        return "met" if self.holds and not self.failures else "missed"
 
     def as_object(self) -> dict[str, Any]:
         """Return the JSON object that the command prints with ``--json``, without the files."""
@@ -161,6 +206,8 @@ def write_document(document: Document, folder: Path) -> list[Path]:
     KeyboardInterrupt
         When interrupted, with advice on the missing files.
     """
+    if not document.has_files:
+        return []
     if document.prepare is not None:
         document.prepare(folder)
     with result_folder(folder) as place:

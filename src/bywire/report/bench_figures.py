@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import xarray as xr
-
 from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
 from bywire.bench.kpis import sine_sweep
 from bywire.bench.running import Result
@@ -22,6 +20,7 @@ from bywire.report.step_response import StepFacts, step_limits, step_response, t
 from bywire.report.time_traces import overlaid_traces, time_traces
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 
@@ -63,7 +62,7 @@ def _step_response(result: Result) -> list[Shown]:
     if definition.step is None:
         return []
     setting = definition.step(result.bench.chosen_options)
-    recording = result.recordings["run"]
+    recording = result.recorded["run"]
     kpis = {kpi.name: kpi.value for kpi in result.kpis}
     judged = step_limits(definition, result.bench.chosen_options)
     facts = None
@@ -89,12 +88,12 @@ def _step_response(result: Result) -> list[Shown]:
 def _time_traces(result: Result) -> list[Shown]:
     return [
         Shown(
-            f"time-traces-{label}" if len(result.recordings) > 1 else "time-traces",
+            f"time-traces-{label}" if len(result.recorded) > 1 else "time-traces",
             time_traces(recording, stated=stated_for(result.bench)),
-            f"Time traces{f', {label}' if len(result.recordings) > 1 else ''}. Shaded: stuck. "
+            f"Time traces{f', {label}' if len(result.recorded) > 1 else ''}. Shaded: stuck. "
             "Lightly shaded: repeatedly stuck, with the stuck fraction of the shaded time.",
         )
-        for label, recording in result.recordings.items()
+        for label, recording in result.recorded.items()
         if "time" in recording.dims
     ]
 
@@ -102,7 +101,7 @@ def _time_traces(result: Result) -> list[Shown]:
 def _overlaid_traces(result: Result) -> list[Shown]:
     """Return a figure for all recordings whose labels differ only in the first part."""
     groups: dict[str, dict[str, xr.Dataset]] = {}
-    for label, recording in result.recordings.items():
+    for label, recording in result.recorded.items():
         line, _, group = label.partition("-")
         groups.setdefault(group, {})[line] = recording
     return [
@@ -117,8 +116,8 @@ def _overlaid_traces(result: Result) -> list[Shown]:
 
 def _energy_balance(result: Result) -> list[Shown]:
     shown = []
-    for label, recording in result.recordings.items():
-        suffix = f"-{label}" if len(result.recordings) > 1 else ""
+    for label, recording in result.recorded.items():
+        suffix = f"-{label}" if len(result.recorded) > 1 else ""
         after = recording.sel(time=slice(-1e-9, None))
         caption = "Energy balance of the actuator from time zero: sources and sinks."
         books = {"energy-balance": (actuator_ledger(after), caption)}
@@ -136,14 +135,14 @@ def _hysteresis_loop(result: Result) -> list[Shown]:
         return []
     setting = definition.loop(result.bench.chosen_options)
     figure = hysteresis_loop(
-        result.recordings, setting.response, setting.drive, setting.demand, setting.smoothing
+        result.recorded, setting.response, setting.drive, setting.demand, setting.smoothing
     )
     caption = "Response versus drive, up and back down."
     return [Shown("hysteresis-loop", figure, caption)]
 
 
 def _stribeck_curve(result: Result) -> list[Shown]:
-    figure = stribeck_curve(result.recordings["curve"])
+    figure = stribeck_curve(result.recorded["curve"])
     return [Shown("stribeck-curve", figure, "Friction versus speed.")]
 
 
@@ -152,7 +151,7 @@ def _tracking(result: Result) -> list[Shown]:
     if definition.followed is None:
         return []
     setting = definition.followed(result.bench.chosen_options)
-    figure = tracking(result.recordings["run"], setting.signal, setting.set_point)
+    figure = tracking(result.recorded["run"], setting.signal, setting.set_point)
     return [Shown("tracking", figure, "Signal and the set point that it follows.")]
 
 
@@ -161,7 +160,7 @@ def _sine_sweep(result: Result) -> list[Shown]:
     if definition.sweep is None:
         return []
     setting = definition.sweep(result.bench.chosen_options)
-    sweep = sine_sweep.select(result.recordings["run"], setting)
+    sweep = sine_sweep.select(result.recorded["run"], setting)
     if not sweep.frequencies.size:  # interrupted within the first sine
         return []
     response = Response(

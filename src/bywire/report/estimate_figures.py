@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -21,6 +21,9 @@ from bywire.report import style
 from bywire.report.channel import axis_unit, channel, decimate, kept_samples
 from bywire.report.panels import Role
 from bywire.report.wording import amount, in_display_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _NAMED = 8  # maximum number of records with room for their names
 _ROOM = 0.06  # fraction of the first panel's height for the names

@@ -41,6 +41,11 @@ def identity() -> list[tuple[str, str]]:
     return [(label, clean(text)) for label, text in rows if text]
 
 
+def today() -> str:
+    """Return the date of a report that is written now, as in `identity`."""
+    return _date()[: len("2000-01-01")]
+
+
 def _date() -> str:
     fixed = os.environ.get("SOURCE_DATE_EPOCH", "")
     if fixed.isdecimal():

@@ -11,6 +11,7 @@ from html import escape
 from importlib.resources import files
 from itertools import count
 from pathlib import Path
+from urllib.parse import quote
 
 from bywire.core.version import __version__
 from bywire.report.document import (
@@ -31,6 +32,7 @@ from bywire.report.result_folder import listed
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
 
+_SHORT = 12  # characters of a name that stays in one line
 _MANY = 7  # columns from which a table may be wider than text
 _MARKS = {"good": "✓ ", "bad": "✗ ", "open": "? ", "none": ""}
 
@@ -255,8 +257,12 @@ def _table_cell(cell: Cell, column: Column, is_sortable: bool, *, is_first: bool
     number = cell.value if is_sortable else None
     data = "" if number is None else f' data-value="{number}"'
     text = escape(_MARKS[cell.verdict] + cell.text).replace("\n", "<br>")
-    if is_first:  # on a phone, a long name must leave room for the verdict
+    if is_first and "-" in cell.text and len(cell.text) <= _SHORT:
+        text = f'<span class="name">{text}</span>'
+    elif is_first:  # on a phone, a long name must leave room for the verdict
         text = text.replace("_", "_<wbr>")
+    if cell.link:
+        text = f'<a href="{escape(quote(cell.link))}">{text}</a>'
     if cell.verdict != "none":
         return f'<td class="{cell.verdict}{" number" * column.numeric}"{data}>{text}</td>'
     return f"<td{_number_class(column)}{data}>{text}</td>"

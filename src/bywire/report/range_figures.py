@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import matplotlib as mpl
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
@@ -24,6 +23,9 @@ from bywire.report.panels import Role
 from bywire.report.readable_axis import scale_of
 from bywire.report.wording import in_display_unit
 from bywire.synthesis.study import Map
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _COLUMNS = 2
 _HEIGHT = 1.35  # height of a panel [inch]

@@ -9,7 +9,6 @@ from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from bywire.report.panels import Role
 from bywire.report.wording import amount, clean, in_display_unit, unit_text
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.ticker import MultipleLocator
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -9,6 +10,7 @@ from dataclasses import dataclass, fields
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import flattened
 from bywire.bench.changes import OPTION
+from bywire.bench.experiment import error_text
 from bywire.bench.generic_experiment import experiment_of
 from bywire.core.catalog import PARAMETER_SETS, Cited
 from bywire.core.errors import InputError
@@ -239,10 +241,13 @@ def _simulation_changes(bench: Bench) -> Iterator[Change]:
     defaults = {each.name: each.default for each in fields(Bench)}
     for name, unit in _SIMULATION.items():
         value, before = getattr(bench, name), defaults[name]
-        if value != before:
+        if value not in (before, math.nan):  # NaN: no step is chosen for a stated error
             text = _OWN if before is None else value_text(before, unit)
             now = value_text(value, unit)
             yield Change(f"simulation.{name}", now, text, defaults_of("runs"))
+    if bench.error is not None:
+        now = error_text(float(bench.error))
+        yield Change("simulation.error", now, _UNSET, defaults_of("runs"))
 
 
 def _origin_of(cited: Cited) -> str:

@@ -31,12 +31,15 @@ class Cell:
         Number, or another value for a data table. Default: the text.
     unit
         Unit of a number, SI unless the text has another unit; ``"1"`` for a pure number.
+    link
+        Path of another page, relative to the page of the table; empty for none.
     """
 
     text: str
     verdict: Verdict = "none"
     value: object = None
     unit: str = ""
+    link: str = ""
 
     @property
     def content(self) -> object:
@@ -316,6 +319,7 @@ OUTCOMES: dict[str, Cell] = {
     "met": Cell("met", "good"),
     "missed": Cell("missed", "bad"),
     "undecided": Cell("undecided", "open"),
+    "not shown": Cell("not shown", "open"),
 }
 """texts of a requirement's verdict in tables"""
 

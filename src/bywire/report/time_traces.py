@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert, difference_unit
@@ -21,6 +20,7 @@ from bywire.report.style import Color, inside, value_color, value_scale
 from bywire.report.wording import amount
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -722,6 +722,8 @@ def _less(other: xr.Dataset, base: xr.Dataset, names: list[str]) -> xr.Dataset:
         unit = difference_unit(str(first.attrs.get("units", "1")))
         signals[name] = ("time", apart, {**first.attrs, "units": unit})
     kept = {key: base.attrs[key] for key in ("model",) if key in base.attrs}
+    import xarray as xr  # slow to load
+
     return xr.Dataset(signals, coords={"time": base["time"]}, attrs=kept)
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.running import Progress, Result, run
@@ -42,6 +41,7 @@ from bywire.report.wording import amount
 from bywire.reproduction.item import SHARE, Allowance, Item, RootCause
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 

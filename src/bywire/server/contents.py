@@ -11,7 +11,17 @@ from typing import Any
 from bywire.bench.result_folder import RECORD
 from bywire.core.errors import FileError
 from bywire.data.format_registry import FORMATS
-from bywire.data.toml_file import BENCH, CAMPAIGN, HEADS, LARGEST, LIFE, STUDY, kind_of, read_toml
+from bywire.data.toml_file import (
+    BENCH,
+    CAMPAIGN,
+    HEADS,
+    LARGEST,
+    LIFE,
+    PROCEDURE,
+    STUDY,
+    kind_of,
+    read_toml,
+)
 from bywire.server.place import Place
 
 _DEEP, _MOST = 4, 5000  # maximum depth of nested folders and number of files in a search
@@ -33,6 +43,8 @@ class Contents:
         Files of fault campaigns with their benches.
     lives
         Life files with their lives.
+    procedures
+        Procedure files with their titles.
     results
         Result folders of benches, latest first.
     reports
@@ -49,6 +61,7 @@ class Contents:
     studies: dict[str, str] = field(default_factory=dict)
     campaigns: dict[str, str] = field(default_factory=dict)
     lives: dict[str, str] = field(default_factory=dict)
+    procedures: dict[str, str] = field(default_factory=dict)
     results: list[str] = field(default_factory=list)
     reports: list[str] = field(default_factory=list)
     measurements: list[str] = field(default_factory=list)
@@ -121,6 +134,7 @@ def _note_toml(there: Contents, path: Path, name: str) -> None:
             STUDY: there.studies,
             CAMPAIGN: there.campaigns,
             LIFE: there.lives,
+            PROCEDURE: there.procedures,
         }
         places[kind][name] = subject
     else:

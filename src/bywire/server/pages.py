@@ -224,6 +224,10 @@ def index_page(folder: str, there: Contents, experiments: Mapping[str, str], lar
     lives = [
         [link("/task/life", name, life=name), text(what)] for name, what in there.lives.items()
     ]
+    procedures = [
+        [link("/task/procedure", name, procedure=name), text(what)]
+        for name, what in there.procedures.items()
+    ]
     tools = [
         [link(f"/task/{each.name}", each.form.title), text(each.case.summary)]
         for each in tasks().values()
@@ -238,6 +242,11 @@ def index_page(folder: str, there: Contents, experiments: Mapping[str, str], lar
             else []
         ),
         *([section("Lives", "lives", table(["file", "life"], lives))] if lives else []),
+        *(
+            [section("Procedures", "procedures", table(["file", "title"], procedures))]
+            if procedures
+            else []
+        ),
         section("Tools", "tools", table(["task", "description"], tools)),
         section("Reports", "reports", _listed(["page"], reports, "reports")),
         section(

@@ -41,7 +41,6 @@ def tell(**said: Any) -> None:
 
 _ESTIMATE, _REPORT = 1.0, 5.0  # minimum time between two messages of each kind, s
 _SHARE = 5.0  # and at least this multiple of the time that one message takes
-_BINS = 30
 _MOST = 4  # maximum number of figures of a study without requirements
 
 
@@ -95,7 +94,7 @@ def so_far(findings: Findings) -> list[dict[str, Any]]:
         For each, its ``text``, the ``counts`` of its histogram, and the histogram's ``ends`` with
         units.
     """
-    if not findings.plan.is_sampled or not len(findings.cases):
+    if not findings.plan.is_sampled or not findings.count:
         return []
     return [
         {"text": text, **_bars(findings, name)}
@@ -129,14 +128,10 @@ def _spread(findings: Findings) -> Iterator[tuple[str, str]]:
 
 
 def _bars(findings: Findings, name: str) -> dict[str, Any]:
-    import numpy as np
-
     from bywire.api.study_tables import figure_text
 
-    values = findings.figure(name)
-    known = values[np.isfinite(values)]
-    if not known.size:
+    spread = next((each for each in findings.spreads if each.name == name), None)
+    if spread is None:
         return {"counts": [], "ends": []}
-    counts, edges = np.histogram(known, _BINS)
-    ends = [figure_text(findings, name, float(edges[k])) for k in (0, -1)]
-    return {"counts": counts.tolist(), "ends": ends}
+    ends = [figure_text(findings, name, value) for value in (spread.least, spread.largest)]
+    return {"counts": spread.counts.tolist(), "ends": ends}

@@ -372,6 +372,11 @@ typedef long long int64_t;
 typedef unsigned long long uint64_t;
 #define restrict __restrict__
 #define KERNEL extern "C" __global__
+#define LITERAL(type) type
+#define INT64_MAX 0x7fffffffffffffff
+#define __builtin_memcpy memcpy
+#define __builtin_fabs fabs
+#define __builtin_sqrt sqrt
 """
 
 SCALAR = _INCLUDES + ONE_LANE

@@ -21,7 +21,8 @@ from bywire.simulation.native import Ends, plan_array, pointer, run_in_calls
 from bywire.simulation.schedule import Layout, Schedule
 
 if TYPE_CHECKING:
-    from bywire.simulation.cuda import CudaDevice, CudaKernel
+    from bywire.simulation.cuda import CudaKernel, HeldRows
+    from bywire.simulation.cuda_device import CudaDevice
     from bywire.simulation.program import Program
 
 PAIRED = 32
@@ -55,13 +56,17 @@ class CaseKernel(Protocol):
         """Return an array that the kernel fills fast; its values are not determined."""
         ...
 
+    def hold(self, shape: tuple[int, int, int]) -> HeldRows | None:
+        """Return rows of shape (signals, cases, rows) that stay on a device; None for an array."""
+        ...
+
     def advance(
         self,
         schedule: Schedule,
         parameters: Array,
         stimulus: Any,
         vector: Array,
-        rows: Array,
+        rows: Any,
         end: int,
         begin: int = 0,
         ends: Ends | None = None,
@@ -122,6 +127,10 @@ class LaneKernel:
     def array(self, shape: tuple[int, ...]) -> Array:
         """Return an uninitialized array; see `CaseKernel`."""
         return np.empty(shape)
+
+    def hold(self, shape: tuple[int, int, int]) -> None:
+        """Return nothing, because a processor's rows are arrays; see `CaseKernel`."""
+        return
 
     def advance(
         self,
@@ -204,7 +213,7 @@ def case_kernel(
         For ``cuda`` without a graphics processor, or without enough memory on it.
     """
     if engine == CUDA:
-        from bywire.simulation.cuda import find_device
+        from bywire.simulation.cuda_device import find_device
 
         return cuda_kernel(prepared, find_device(), selection, ends).for_cases(count, schedule)
     compiler = find_compiler()

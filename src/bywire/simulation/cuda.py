@@ -1,393 +1,28 @@
-"""Many cases on a graphics processor, one thread per case: CUDA C, kernels, memory, and errors.
-
-The compiler, NVIDIA's NVRTC library, needs no graphics processor and no driver. bywire caches its
-output with the compiled kernels.
-"""
+"""Many cases on a graphics processor, one thread per case: CUDA C, batches, and recorded rows."""
 
 from __future__ import annotations
 
-import contextlib
 import copy
-import ctypes
-import hashlib
-import importlib
 import math
-import os
-import threading
 import weakref
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
-from functools import cache
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
-from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bywire.core.errors import CompilerError, DeviceError, ParameterError, quoted
+from bywire.core.errors import DeviceError
 from bywire.core.interrupts import raise_if_stopped
-from bywire.core.libraries import how_to_install
-from bywire.core.pairs import read_count
-from bywire.core.scratch import scratch_folder
 from bywire.core.typing import Array
-from bywire.simulation.c_runtime import CUDA, ONE_LANE
-from bywire.simulation.compiler import digest_of, is_intact, sha256, usable_folder
+from bywire.simulation.c_runtime import ONE_LANE
+from bywire.simulation.cuda_device import FLOAT, CudaDevice, Memory, find_device
 from bywire.simulation.emit_single import Caller, emit_single
-from bywire.simulation.native import Ends, Inputs, Request, plan_array, pointer
+from bywire.simulation.native import Ends, Inputs, Request, plan_array
 from bywire.simulation.program import Program
 from bywire.simulation.schedule import Layout, Schedule
 from bywire.simulation.stages import Stages, build_stages, layout_of, leaf_count
-
-# Fused products and sums would round differently from the processor's kernels. The second option is
-# necessary because the source does not declare each function as a device function.
-OPTIONS = ("--fmad=false", "--device-as-default-execution-space")
-OTHERWISE = "or use engine = 'auto', which computes on this machine's processor"
-
-
-def bindings(name: str) -> ModuleType:
-    """Return a module of NVIDIA's bindings, ``"driver"`` or ``"nvrtc"``.
-
-    Raises
-    ------
-    DeviceError
-        When the extra with the module is not installed. The message contains the install command.
-    """
-    try:
-        return importlib.import_module(f"cuda.bindings.{name}")
-    except ImportError:
-        raise DeviceError(
-            "engine 'cuda' needs NVIDIA's bindings and compiler, which are not installed. Install "
-            f"them ({how_to_install('gpu')}), {OTHERWISE}",
-            name="engine",
-            value="cuda",
-        ) from None
-
-
-def cuda_binary(source: str, capability: int, entry: str) -> bytes:
-    """Return a kernel's code for a graphics processor; compile it unless it is in the cache.
-
-    Parameters
-    ----------
-    source
-        CUDA C of the kernel.
-    capability
-        The processor's compute capability: ten times the major number plus the minor number, for
-        example 90.
-    entry
-        Name of the kernel's function.
-
-    Returns
-    -------
-    bytes
-        Machine code, or PTX for the driver to compile if the compiler does not support the
-        processor yet.
-
-    Raises
-    ------
-    DeviceError
-        When the compiler is missing, or no longer supports the processor.
-    CompilerError
-        With the first lines of the compiler's message.
-    """
-    nvrtc = bindings("nvrtc")
-    try:
-        _, *version = nvrtc.nvrtcVersion()
-        _, known = nvrtc.nvrtcGetSupportedArchs()
-    except RuntimeError:  # the bindings are installed, but the library is not
-        raise DeviceError(
-            f"bywire cannot load NVIDIA's compiler NVRTC. Install it ({how_to_install('gpu')}), "
-            f"{OTHERWISE}",
-            name="NVRTC",
-        ) from None
-    target = max((each for each in known if each <= capability), default=0)
-    if not target:
-        raise DeviceError(
-            f"NVRTC {version[0]}.{version[1]} supports graphics processors with compute "
-            f"capability {min(known) / 10:.1f} and later, but this one has "
-            f"{capability / 10:.1f}. Install an older release of NVRTC, {OTHERWISE}",
-            name="NVRTC",
-            value=f"{capability / 10:.1f}",
-            valid=f"{min(known) / 10:.1f} and later",
-        )
-    is_own = target == capability
-    options = (f"--gpu-architecture={'sm' if is_own else 'compute'}_{target}", *OPTIONS)
-    text = CUDA + source
-    key = hashlib.sha256("\0".join((text, *options, *map(str, version))).encode()).hexdigest()[:32]
-    file = usable_folder() / f"{key}.cubin"
-    if is_intact(file, entry):
-        return file.read_bytes()
-    binary = _compiled(nvrtc, text, options, is_own)
-    if not is_own:  # the driver caches the code that it compiles from PTX
-        return binary
-    with contextlib.suppress(OSError), scratch_folder(file.parent) as scratch:
-        built, fresh = scratch / "kernel.cubin", scratch / "digest"
-        built.write_bytes(binary)
-        fresh.write_text(sha256(built))
-        os.replace(built, file)
-        os.replace(fresh, digest_of(file))
-    return binary
-
-
-def _compiled(nvrtc: Any, text: str, options: tuple[str, ...], is_own: bool) -> bytes:
-    error, program = nvrtc.nvrtcCreateProgram(text.encode(), b"kernel.cu", 0, [], [])
-    try:
-        if not int(error):
-            given = [each.encode() for each in options]
-            (error,) = nvrtc.nvrtcCompileProgram(program, len(given), given)
-        if int(error):
-            log = _text(nvrtc.nvrtcGetProgramLogSize, nvrtc.nvrtcGetProgramLog, program)
-            lines = log.rstrip(b"\0").decode(errors="replace").splitlines()
-            message = "\n".join(line for line in lines if line.strip())[:2000] or error.name
-            text = f"NVRTC rejected a generated kernel:\n{message}\n{OTHERWISE.capitalize()}"
-            raise CompilerError(text, name="NVRTC")
-        if is_own:
-            return _text(nvrtc.nvrtcGetCUBINSize, nvrtc.nvrtcGetCUBIN, program)
-        return _text(nvrtc.nvrtcGetPTXSize, nvrtc.nvrtcGetPTX, program)
-    finally:
-        nvrtc.nvrtcDestroyProgram(program)
-
-
-def _text(size_of: Any, fill: Any, program: Any) -> bytes:
-    """Return a text property of a program. The bindings write to an existing buffer."""
-    _, size = size_of(program)
-    content = bytes(bytearray(size))
-    fill(program, content)
-    return content
-
-
-# --- The device and its driver
-
-VARIABLE = "BYWIRE_GPU"
-"""environment variable that selects one of several graphics processors by number"""
-_NO_DRIVER = "the driver's library is missing"
-_OUT_OF_MEMORY = 2  # CUDA_ERROR_OUT_OF_MEMORY
-_BLOCKING = 4  # CU_CTX_SCHED_BLOCKING_SYNC
-_MEGA = 1e6
-_FLOAT = 8  # bytes
-
-
-class CudaDevice:
-    """NVIDIA graphics processor.
-
-    Parameters
-    ----------
-    driver
-        ``cuda.bindings.driver``, after ``cuInit``.
-    number
-        Number of the graphics processor, >= 0.
-    """
-
-    def __init__(self, driver: Any, number: int) -> None:
-        self._driver, self._lock = driver, threading.RLock()
-        self._device = self._checked(driver.cuDeviceGet(number))
-        name = self._checked(driver.cuDeviceGetName(128, self._device))
-        self.label = name.split(b"\0")[0].decode(errors="replace")
-        kinds = driver.CUdevice_attribute
-        major, minor = (
-            self._checked(driver.cuDeviceGetAttribute(kind, self._device))
-            for kind in (
-                kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR,
-                kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR,
-            )
-        )
-        self._capability = 10 * int(major) + int(minor)
-        # A thread that waits leaves its core to other work. The flag is a wish: another library of
-        # this process may have chosen already.
-        driver.cuDevicePrimaryCtxSetFlags(self._device, _BLOCKING)
-        self._free: list[tuple[int, int]] = []
-        self._context = self._checked(driver.cuDevicePrimaryCtxRetain(self._device))
-
-    def load(self, source: str, entry: str) -> Any:
-        """Return the function of a kernel.
-
-        Raises
-        ------
-        CompilerError
-            With the compiler's message.
-        """
-        binary = cuda_binary(source, self._capability, entry)
-        with self._current():
-            module = self._checked(self._driver.cuModuleLoadData(binary))
-            return self._checked(self._driver.cuModuleGetFunction(module, entry.encode()))
-
-    def free(self) -> int:
-        """Return the number of free bytes."""
-        with self._current():
-            return int(self._checked(self._driver.cuMemGetInfo())[0])
-
-    def host_array(self, shape: tuple[int, ...]) -> Array:
-        """Return an uninitialized array in page-locked memory, which the device fills directly.
-
-        The system maps new memory page by page, which takes longer than to fill it. So the memory
-        of an array that nothing refers to any more is used again. Memory that cannot be locked is
-        ordinary memory.
-        """
-        size = max(math.prod(shape) * _FLOAT, 8)
-        with self._current():
-            fitting = [each for each in self._free if size <= each[1] <= 2 * size]
-            if fitting:
-                block = min(fitting, key=lambda each: each[1])
-                self._free.remove(block)
-            else:
-                for address, _ in self._free:
-                    self._driver.cuMemFreeHost(address)
-                self._free.clear()
-                status, address = self._driver.cuMemHostAlloc(size, 0)
-                if int(status):
-                    return np.empty(shape)
-                block = int(address), size
-        held = (ctypes.c_byte * block[1]).from_address(block[0])
-        weakref.finalize(held, self._free.append, block).atexit = False
-        memory = memoryview(held)  # keeps it
-        return np.frombuffer(memory, dtype=float, count=math.prod(shape)).reshape(shape)
-
-    @contextmanager
-    def working(self) -> Iterator[Memory]:
-        """Reserve the device and memory on it; the memory is freed at the end."""
-        with self._current():
-            memory = Memory(self._driver, self._checked)
-            try:
-                yield memory
-            finally:
-                memory.give_back()
-
-    @contextmanager
-    def _current(self) -> Iterator[None]:
-        """Reserve the device for the calling thread. This costs no time: it has only one queue."""
-        with self._lock:
-            self._checked(self._driver.cuCtxSetCurrent(self._context))
-            yield
-
-    def _checked(self, answer: Any, size: int = 0) -> Any:
-        """Return the results of a driver function, without its status.
-
-        Raises
-        ------
-        DeviceError
-            When the status is an error. ``size``: number of requested bytes.
-        """
-        status, *values = answer
-        if not int(status):
-            return values[0] if len(values) == 1 else values
-        if int(status) == _OUT_OF_MEMORY:
-            unknown, *sizes = self._driver.cuMemGetInfo()  # this call may also fail
-            left = (
-                ""
-                if int(unknown)
-                else " ({:.4g} of {:.4g} MB are free)".format(*(size / _MEGA for size in sizes))
-            )
-            need = f"{size / _MEGA:.3g} MB" if size else "memory"
-            raise DeviceError(
-                f"{self.label} cannot allocate {need}{left}. End other programs on this graphics "
-                f"processor, select another one with {VARIABLE}, {OTHERWISE}",
-                name=self.label,
-                value=need,
-            )
-        _, reason = self._driver.cuGetErrorString(status)
-        text = (reason or b"").decode(errors="replace") or status.name
-        where = getattr(self, "label", "a graphics processor")
-        message = f"{where} failed: {text} ({status.name}). Rerun the command, {OTHERWISE}"
-        raise DeviceError(message, name=where, value=status.name)
-
-
-class Memory:
-    """Memory blocks on a graphics processor that are freed together, with operations on them.
-
-    Parameters
-    ----------
-    driver, checked
-        The driver, and a function that raises errors for its statuses.
-    """
-
-    def __init__(self, driver: Any, checked: Callable[..., Any]) -> None:
-        self._driver, self._checked = driver, checked
-        self._places: list[Any] = []
-
-    def room(self, size: int) -> Any:
-        """Return the address of a number of uninitialized bytes.
-
-        Raises
-        ------
-        DeviceError
-            When there is not enough free memory.
-        """
-        place = self._checked(self._driver.cuMemAlloc(max(size, 8)), size)
-        self._places.append(place)
-        return place
-
-    def put(self, place: Any, array: NDArray[Any]) -> None:
-        """Copy a C-contiguous array to an address."""
-        if array.nbytes:
-            self._checked(self._driver.cuMemcpyHtoD(place, pointer(array).value, array.nbytes))
-
-    def get(self, place: Any, array: NDArray[Any]) -> None:
-        """Copy memory at an address into a C-contiguous array."""
-        if array.nbytes:
-            self._checked(self._driver.cuMemcpyDtoH(pointer(array).value, place, array.nbytes))
-
-    def run(self, function: Any, blocks: int, threads: int, arguments: Sequence[Any]) -> None:
-        """Run a kernel and wait for its end; the arguments are addresses and floats."""
-        values = [
-            ctypes.c_double(each) if isinstance(each, float) else ctypes.c_void_p(int(each))
-            for each in arguments
-        ]
-        addresses = (ctypes.c_void_p * len(values))(*map(ctypes.addressof, values))
-        self._checked(
-            self._driver.cuLaunchKernel(
-                function, blocks, 1, 1, threads, 1, 1, 0, 0, ctypes.addressof(addresses), 0
-            )
-        )
-        self._checked(self._driver.cuCtxSynchronize())
-
-    def give_back(self) -> None:
-        """Free all memory."""
-        for place in self._places:  # a failed kernel has already invalidated everything
-            self._driver.cuMemFree(place)
-
-
-@cache
-def find_device() -> CudaDevice:
-    """Return the graphics processor to use: the first one, or the one in ``BYWIRE_GPU``.
-
-    Raises
-    ------
-    DeviceError
-        When there is no graphics processor or driver, or the extra ``bywire[gpu]`` is not
-        installed.
-    ParameterError
-        When ``BYWIRE_GPU`` is not the number of a graphics processor.
-    """
-    driver = bindings("driver")
-    try:
-        status, count = driver.cuInit(0)[0], 0
-        if not int(status):
-            status, count = driver.cuDeviceGetCount()
-        reason = "" if not int(status) else status.name
-    except RuntimeError:
-        reason, count = _NO_DRIVER, 0
-    if reason or not count:
-        why = f" ({reason})" if reason else ""
-        raise DeviceError(
-            f"engine 'cuda' finds no NVIDIA graphics processor{why}. Check that nvidia-smi lists "
-            f"one, {OTHERWISE}",
-            name="engine",
-            value="cuda",
-            valid="engine = 'auto'",
-        )
-    requested = os.environ.get(VARIABLE, "0")
-    number = read_count(requested)
-    if number is None or number >= count:
-        raise ParameterError(
-            f"{VARIABLE} = {quoted(requested)} is not valid: it must be "
-            f"{'0' if count == 1 else f'0 to {count - 1}'}, the number of a graphics processor",
-            name=VARIABLE,
-            value=requested,
-            valid="0" if count == 1 else f"0 to {count - 1}",
-        )
-    return CudaDevice(driver, number)
-
 
 # --- Kernels of many cases
 # The graphics processor computes cases in batches that fit into its memory, and each batch in time
@@ -499,7 +134,7 @@ class CudaKernel:
         """
         free = self._device.free()
         room = int(_SHARE * free) - _plan_size(schedule, self._inputs[1])
-        size, row = self._size(schedule), _FLOAT * self._signals
+        size, row = self._size(schedule), FLOAT * self._signals
         least = size + row * _most_rows(schedule)
         most = min(MOST, room // least)
         if most < 1:
@@ -524,20 +159,27 @@ class CudaKernel:
         """Return an uninitialized array that the device fills fast; see `CaseKernel`."""
         return self._device.host_array(shape)
 
+    def hold(self, shape: tuple[int, int, int]) -> HeldRows | None:
+        """Return rows that stay on the device if they fit there together; see `CaseKernel`."""
+        _, cases, rows = shape
+        fits = cases == self.lanes and rows <= self._most
+        return HeldRows(self._device, shape) if fits else None
+
     def advance(
         self,
         schedule: Schedule,
         parameters: Array,
         stimulus: Array | Inputs,
         vector: Array,
-        rows: Array,
+        rows: Array | Window,
         end: int,
         begin: int = 0,
         ends: Ends | None = None,
     ) -> None:
         """Run the frames from begin to end for one batch; see ``case_kernels.LaneKernel.advance``.
 
-        ``stimulus``: rows for all cases, shape (rows, nu), or `Inputs`.
+        ``stimulus``: rows for all cases, shape (rows, nu), or `Inputs`. ``rows``: an array, or a
+        window of rows that stay on the device.
 
         Raises
         ------
@@ -556,12 +198,16 @@ class CudaKernel:
             state, par = memory.room(vector.nbytes), memory.room(parameters.nbytes)
             memory.put(state, vector)
             memory.put(par, parameters)
-            given = _Given(memory, inputs, _stimulus_rows(schedule))
+            given = _Given(memory, inputs, _stimulus_rows(schedule), self.array)
             plan = memory.room(_plan_size(schedule, self._inputs[1]))
             pieces = _pieces(schedule, begin, end)
             counts = [rows_between(schedule, *piece) for piece in pieces]
-            recording = _Recording(rows, counts, self._most, self.array)
-            room = memory.room(recording.size)
+            recording: _Recording | _Staying
+            if isinstance(rows, Window):
+                recording, room = _Staying(rows), rows.place
+            else:
+                recording = _Recording(rows, counts, self._most)
+                room = memory.room(recording.size)
             apart = np.empty(0) if ends is None else np.ascontiguousarray(ends.values)
             edges = memory.room(apart.nbytes)
             memory.put(edges, apart)
@@ -574,7 +220,7 @@ class CudaKernel:
                 ahead = first // schedule.stimulus_frames
                 where = given.rows(ahead, last // schedule.stimulus_frames + 1)
                 numbers = [*plan_array(schedule, first, last, self._signals)]
-                numbers += [self.lanes, len(rows), ahead, *recording.apart, *frames, *where]
+                numbers += [self.lanes, recording.cases, ahead, *recording.apart, *frames, *where]
                 memory.put(plan, np.array(numbers, dtype=np.int64))
                 memory.run(
                     self._function,
@@ -601,12 +247,12 @@ class CudaKernel:
         """Return the size in bytes of a case with its own stimulus, without recorded rows."""
         parameters, inputs = self._inputs
         stimulus = inputs * _stimulus_rows(schedule)
-        return _FLOAT * (parameters + self.layout.total + stimulus + 2 * self.ends)
+        return FLOAT * (parameters + self.layout.total + stimulus + 2 * self.ends)
 
 
 def _plan_size(schedule: Schedule, inputs: int) -> int:
     """Return the size of a kernel's plan in bytes."""
-    return _FLOAT * (8 + len(schedule.task_frames) + _NUMBERS + 3 * inputs)
+    return FLOAT * (8 + len(schedule.task_frames) + _NUMBERS + 3 * inputs)
 
 
 class _Given:
@@ -618,18 +264,29 @@ class _Given:
         The device's memory, and the stimulus.
     most
         Maximum number of rows in an interval.
+    array
+        ``array(shape)`` allocates page-locked memory, from which copies are fast.
     """
 
-    def __init__(self, memory: Memory, inputs: Inputs, most: int) -> None:
+    def __init__(
+        self,
+        memory: Memory,
+        inputs: Inputs,
+        most: int,
+        array: Callable[[tuple[int, ...]], Array],
+    ) -> None:
         self._memory, self._inputs = memory, inputs
         size = sum(len(each) * min(each.shape[1], most) for each in inputs.values)
-        self.place = memory.room(_FLOAT * size)
+        self.place = memory.room(FLOAT * size)
+        self._buffer = array((size,))
 
     def rows(self, begin: int, end: int) -> list[int]:
         """Copy the rows from begin to end, and return the place and distances of each number."""
         parts = [each[:, begin:end] if each.shape[1] > 1 else each for each in self._inputs.values]
         if parts:
-            self._memory.put(self.place, np.concatenate([part.ravel() for part in parts]))
+            filled = self._buffer[: sum(part.size for part in parts)]
+            np.concatenate([part.ravel() for part in parts], out=filled)
+            self._memory.put(self.place, filled)
         where, start = [], 0
         for part, each in zip(parts, self._inputs.values, strict=True):
             by_row = int(each.shape[1] > 1)
@@ -644,10 +301,9 @@ def _frames(schedule: Schedule) -> int:
 
 
 class _Recording:
-    """Destination of the rows of several time intervals, in the order of the caller's array.
+    """Rows of several time intervals on the device, in the order of the caller's array.
 
-    If the rows fill the caller's array and have room on the device, they are fetched at the end,
-    directly into the array. Otherwise, the rows of each interval go through a buffer.
+    They are fetched directly into the caller's array, all at the end if they fit on the device.
 
     Parameters
     ----------
@@ -656,59 +312,174 @@ class _Recording:
     counts
         Number of rows of each interval.
     most
-        Maximum number of rows on the device.
-    array
-        ``array(shape)`` allocates the buffer.
+        Maximum number of rows on the device, at least those of one interval.
     """
 
-    def __init__(
-        self,
-        rows: Array,
-        counts: Sequence[int],
-        most: int,
-        array: Callable[[tuple[int, ...]], Array],
-    ) -> None:
-        self._rows, self._at, self.count = rows, 0, 0
+    def __init__(self, rows: Array, counts: Sequence[int], most: int) -> None:
+        self._rows, self._at, self.count, self.cases = rows, 0, 0, len(rows)
         self._order = sorted(range(3), key=lambda axis: -rows.strides[axis])
-        straight = rows[:, : sum(counts)].transpose(self._order)
-        self._is_whole = straight.flags.c_contiguous and sum(counts) <= most
-        self._most = sum(counts) if self._is_whole else max(counts)
-        size = len(rows) * self._most * rows.shape[2]
-        self._buffer = array((0 if self._is_whole else size,))
-        self.size = _FLOAT * size
-        self.begin([0])
+        self._most = max(min(most, sum(counts)), *counts)
+        self.size = FLOAT * len(rows) * self._most * rows.shape[2]
+        self.begin(counts)
 
     @property
     def offset(self) -> int:
         """Place of the next row on the device, from the first one [byte]."""
-        return _FLOAT * self.apart[1] * self.count
+        return FLOAT * self.apart[1] * self.count
 
     def fits(self, count: int) -> bool:
         """Return whether there is room for so many more rows."""
         return self.count + count <= self._planned
 
     def begin(self, counts: Sequence[int]) -> None:
-        """Prepare the destination of the rows of the next intervals, as many as there is room."""
+        """Plan to record the rows of the next intervals, as many as there is room for."""
         totals = np.cumsum(counts)
         self._planned = int(totals[totals <= self._most].max(initial=counts[0]))
         shape = len(self._rows), self._planned, self._rows.shape[2]
-        target = self._rows[:, self._at : self._at + self._planned].transpose(self._order)
-        buffer = self._buffer[: math.prod(shape)] if not self._is_whole else None
-        self._target = target
-        self._place = (
-            target if buffer is None else buffer.reshape([shape[axis] for axis in self._order])
-        )
-        strides = self._place.transpose(np.argsort(self._order)).strides
-        self.apart = [stride // _FLOAT for stride in strides]
+        inner = {
+            axis: math.prod(shape[each] for each in self._order[place + 1 :])
+            for place, axis in enumerate(self._order)
+        }
+        self.apart = [inner[axis] for axis in range(3)]
 
     def fetch(self, memory: Memory, room: Any) -> None:
         """Copy the rows into the caller's array."""
         if self.count:
-            memory.get(room, self._place)
-            if not self._is_whole:
-                self._target[:] = self._place
+            target = self._rows[:, self._at : self._at + self._planned]
+            memory.get(room, target.transpose(self._order))
         self._at += self.count
         self.count = 0
+
+
+class _Staying:
+    """Rows of time intervals that stay where they are recorded; see `_Recording`."""
+
+    def __init__(self, rows: Window) -> None:
+        self.count, self.cases, self.apart = 0, rows.cases, rows.apart
+
+    @property
+    def offset(self) -> int:
+        return FLOAT * self.count
+
+    def fits(self, count: int) -> bool:
+        return True
+
+    def begin(self, counts: Sequence[int]) -> None:
+        pass
+
+    def fetch(self, memory: Memory, room: Any) -> None:
+        pass
+
+
+@dataclass(frozen=True)
+class Window:
+    """Part of `HeldRows` that a kernel fills.
+
+    Parameters
+    ----------
+    place
+        Address of its first row.
+    cases
+        Number of cases.
+    apart
+        Distances between cases, rows and signals, in numbers.
+    """
+
+    place: int
+    cases: int
+    apart: tuple[int, int, int]
+
+
+EXTREMES_ENTRY = "bw_extremes"
+EXTREMES = f"""
+KERNEL void __launch_bounds__({THREADS}) {EXTREMES_ENTRY}(const int64_t *restrict sizes,
+    const double *restrict rows, double *restrict extremes) {{
+  const int64_t at = (int64_t)blockIdx.x * blockDim.x + threadIdx.x, n = sizes[1];
+  if (at >= sizes[0]) return;
+  const double *y = rows + at * n;
+  double low = y[0], high = y[0];
+  int is_finite = 1;
+  for (int64_t k = 0; k < n; ++k) {{
+    uint64_t bits;
+    memcpy(&bits, y + k, sizeof(bits));
+    is_finite &= (~bits & 0x7ff0000000000000u) != 0;
+    low = y[k] < low ? y[k] : low;
+    high = y[k] > high ? y[k] : high;
+  }}
+  const uint64_t bits = 0x7ff8000000000000u;
+  if (!is_finite) memcpy(&low, &bits, sizeof(bits)), memcpy(&high, &bits, sizeof(bits));
+  double *to = extremes + 4 * at;
+  to[0] = y[0], to[1] = low, to[2] = high, to[3] = y[n - 1];
+}}
+"""
+"""kernel for the extremes of rows, one thread for each signal of a case"""
+
+
+class HeldRows:
+    """Recorded rows that stay on the device, like an array of shape (signals, cases, rows).
+
+    They are fetched on first use, signal by signal or all together, until they are closed.
+
+    Parameters
+    ----------
+    device
+        The graphics processor.
+    shape
+        Number of signals, cases and rows.
+    """
+
+    def __init__(self, device: CudaDevice, shape: tuple[int, int, int]) -> None:
+        self.device, self.shape = device, shape
+        self.place = device.keep(FLOAT * math.prod(shape))
+        self.close = weakref.finalize(self, device.drop, self.place)
+        self.close.atexit = False
+        self._fetched: dict[int, Array] = {}
+
+    def window(self, first: int) -> Window:
+        """Return the part from a row on, for all signals and cases."""
+        _, cases, rows = self.shape
+        return Window(self.place + FLOAT * first, cases, (rows, 1, cases * rows))
+
+    def signal(self, k: int) -> Array:
+        """Return a signal, shape (cases, rows)."""
+        if k not in self._fetched:
+            self._fetched[k] = self._copied(self.address(k), self.shape[1:])
+        return self._fetched[k]
+
+    @cached_property
+    def extremes(self) -> Array:
+        """First, lowest, highest and last row of each signal, shape (signals, cases, 4).
+
+        The lowest and the highest are NaN if a row is not finite.
+        """
+        signals, cases, rows = self.shape
+        function = self.device.load(EXTREMES, EXTREMES_ENTRY)
+        array = self.device.host_array((signals, cases, 4))
+        with self.device.working() as memory:
+            sizes, room = memory.room(2 * FLOAT), memory.room(array.nbytes)
+            memory.put(sizes, np.array([signals * cases, rows]))
+            arguments = sizes, self.place, room
+            memory.run(function, -(-signals * cases // THREADS), THREADS, arguments)
+            memory.get(room, array)
+        return array
+
+    def address(self, k: int) -> int:
+        """Return the address of a signal, whose cases are contiguous, one after the other."""
+        return self.place + FLOAT * k * self.shape[1] * self.shape[2]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.array(self._copied(self.place, self.shape), dtype=dtype, copy=copy)
+
+    def __getitem__(self, key: Any) -> Any:
+        return np.asarray(self)[key]
+
+    def _copied(self, place: int, shape: tuple[int, ...]) -> Array:
+        if not self.close.alive:
+            raise ValueError("these rows have been freed")
+        array = self.device.host_array(shape)
+        with self.device.working() as memory:
+            memory.get(place, array)
+        return array
 
 
 def rows_between(schedule: Schedule, begin: int, end: int) -> int:

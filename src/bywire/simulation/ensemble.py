@@ -12,13 +12,14 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, not_valid, unknown_name
 from bywire.core.interrupts import thread_pool
+from bywire.core.on_demand import OnDemand
 from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
 from bywire.simulation.advance import (
@@ -33,18 +34,23 @@ from bywire.simulation.advance import (
 from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
 from bywire.simulation.engine import CUDA, are_alike, prepare
 from bywire.simulation.native import Ends, Inputs
+from bywire.simulation.noise import Noise, put_noises
 from bywire.simulation.run import (
     Run,
     Trajectory,
     initial_vector,
     initial_vectors,
-    put_into,
+    put_signals,
     sampled_stimulus,
     selected,
     simulate,
     stimulus_ranges,
 )
+from bywire.simulation.run_table import RunTable, change, one_of
 from bywire.simulation.schedule import COUNTERS, Schedule
+
+if TYPE_CHECKING:
+    from bywire.simulation.cuda import HeldRows
 
 # Maximum number of intervals of a run, and minimum number of substeps per interval. Between
 # intervals, the run reports progress and handles interrupts, which takes as long as a hundred
@@ -63,6 +69,8 @@ def fit_lanes(runs: Sequence[Run], engine: str = "auto") -> bool:
     """
     if not is_side_by_side(engine) or not runs:
         return False
+    if isinstance(runs, RunTable):
+        return True
     first, schedule = runs[0], runs[0].schedule()
     return all(
         are_alike(each.model, each.par, first.model, first.par) and each.schedule() == schedule
@@ -83,7 +91,8 @@ class RunGroup(Sequence[Trajectory]):
         Times of the rows [s], shape (rows,).
     values
         Signals, each contiguous over all runs, shape (signals, runs, rows). If runs have changes
-        and the stored energy is recorded, the last signal is the work of the changes.
+        and the stored energy is recorded, the last signal is the work of the changes. Rows that a
+        graphics processor holds are fetched on first use.
     names
         Names of the signals, in the order of the first axis.
     vectors
@@ -95,9 +104,9 @@ class RunGroup(Sequence[Trajectory]):
         their names.
     """
 
-    runs: tuple[Run, ...]
+    runs: Sequence[Run]
     time: Array
-    values: Array
+    values: Array | HeldRows
     names: tuple[str, ...]
     vectors: Array
     kernel: CaseKernel
@@ -108,6 +117,33 @@ class RunGroup(Sequence[Trajectory]):
     def unsettled(self) -> NDArray[np.int64]:
         """Substeps of each run that hit the contact iteration's limit, shape (runs,)."""
         return np.asarray(self.vectors[self.kernel.layout.start["counters"]], dtype=np.int64)
+
+    @property
+    def signals(self) -> Mapping[str, Array]:
+        """Signals by name, shape (runs, rows)."""
+        if isinstance(self.values, np.ndarray):
+            return dict(zip(self.names, self.values, strict=True))
+        signal, places = self.values.signal, {name: k for k, name in enumerate(self.names)}
+        return OnDemand(places, lambda name: signal(places[name]))
+
+    @property
+    def edges(self) -> Mapping[str, Array]:
+        """First and last row of each signal by name, shape (runs, 2)."""
+        if isinstance(self.values, np.ndarray):
+            both = self.values[:, :, [0, -1]]
+        else:
+            both = self.values.extremes[:, :, [0, -1]]
+        return dict(zip(self.names, both, strict=True))
+
+    @property
+    def held(self) -> HeldRows | None:
+        """The rows that a graphics processor holds; None for an array."""
+        return None if isinstance(self.values, np.ndarray) else self.values
+
+    def close(self) -> None:
+        """Free rows that a graphics processor holds, which cannot be fetched any more."""
+        if not isinstance(self.values, np.ndarray):
+            self.values.close()
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -145,6 +181,7 @@ def simulate_group(
     first: int = 0,
     engine: str = "auto",
     ends: Sequence[str] = (),
+    hold: bool = False,
 ) -> RunGroup:
     """Compute runs side by side, each with its own parameters, initial values and stimulus.
 
@@ -166,6 +203,8 @@ def simulate_group(
     ends
         Additional outputs to record only in the first and last rows. This requires runs without
         changes.
+    hold
+        Whether a graphics processor may hold the rows until they are read; see `RunGroup.close`.
 
     Raises
     ------
@@ -188,38 +227,45 @@ def simulate_group(
             "model, structure, duration, step, recording interval and sample times",
             name="runs",
         )
-    prepared = prepare(runs[0].model, runs[0].par)
+    one = one_of(runs)
+    prepared = prepare(one.model, one.par)
     names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
-    if ends and any(run.changes for run in runs):
+    if ends and change(runs):
         raise ParameterError(
             "ends is not available for runs with changes, which record all rows. Omit ends",
             name="ends",
         )
     selection = tuple(selected(names, (*wanted, *ends)).tolist())
-    schedule = runs[0].schedule()
+    schedule = one.schedule()
     kernel = case_kernel(prepared, engine, selection, len(runs), schedule, len(ends))
     edges = _edges(schedule, first, runs, _CUDA_SUBSTEPS if engine == CUDA else _SUBSTEPS)
-    output = runs[0].model.Output
-    jumping = energies(output, wanted) if any(run.changes for run in runs) else np.empty((0, 0))
+    output = one.model.Output
+    jumping = energies(output, wanted) if change(runs) else np.empty((0, 0))
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
     recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
-    values = kernel.array((len(recorded), len(runs), schedule.rows - first))
-    values[len(wanted) :] = 0.0  # sums up the work of changes
+    shape = len(recorded), len(runs), schedule.rows - first
+    held = kernel.hold(shape) if hold and not change(runs) else None
+    values: Array | HeldRows = kernel.array(shape) if held is None else held
+    if isinstance(values, np.ndarray):
+        values[len(wanted) :] = 0.0  # sums up the work of changes
     at_ends = np.zeros((len(ends), len(runs), 2))
     frames = (first * schedule.record_frames, (schedule.rows - 1) * schedule.record_frames)
 
+    room = _Room()
+
     def computed(begin: int) -> Array:
         cases = slice(begin, begin + kernel.lanes)
-        carried = _Carried(kernel, schedule, runs[cases], jumping)
+        carried = _Carried(kernel, schedule, runs[cases], jumping, room)
         apart = Ends(at_ends[:, cases], frames) if ends else None
-        return carried.to_the_end(values[:, cases], edges, first, watch, apart)
+        part = values[:, cases] if isinstance(values, np.ndarray) else values
+        return carried.to_the_end(part, edges, first, watch, apart)
 
     with thread_pool(threads or kernel.at_once) as pool:
         vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
     vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
     return RunGroup(
-        tuple(runs),
+        runs if isinstance(runs, RunTable) else tuple(runs),
         schedule.record_times[first:],
         values,
         recorded,
@@ -239,7 +285,8 @@ def _edges(schedule: Schedule, first: int, runs: Sequence[Run], least: int) -> l
     every = schedule.record_frames
     count = min(_CHUNKS, schedule.frames * schedule.substeps // least + 1)
     rows = {*np.linspace(0, schedule.frames // every, count + 1).astype(int).tolist(), first}
-    changed = (pieces(run.par, run.changes, schedule) for run in runs if run.changes)
+    several = runs if change(runs) else ()
+    changed = (pieces(run.par, run.changes, schedule) for run in several if run.changes)
     begins = {begin for stretches in changed for begin, _, _ in stretches}
     return sorted(begins.union(each * every for each in rows))
 
@@ -258,13 +305,37 @@ class _Watch:
                 self._progress(self._done / self._pieces)
 
 
+class _Room(threading.local):
+    """Memory of a thread for the stimuli of one group of lanes after the other."""
+
+    rows: Array | None = None
+
+
+def _shared_stimuli(group: RunTable, kernel: CaseKernel, room: _Room) -> Array | Inputs:
+    """Return stimulus rows as in `_stimuli`; for lanes, they are valid until the next group."""
+    count, width, own = len(group), kernel.lanes, np.array(group.noisy, dtype=int)
+    if kernel.shares_stimuli:
+        inputs = Inputs.of(lambda _: np.ascontiguousarray(group.stimulus.T), 1, width)
+        noise = _noise_rows(group.seeds, group.noisy, width, len(group.stimulus))
+        return inputs.with_noise(noise)
+    if not own.size:
+        return group.stimulus
+    if room.rows is None:
+        room.rows = np.repeat(group.stimulus[:, :, None], width, axis=2)
+    rows = room.rows
+    put_noises(rows.transpose(2, 0, 1)[:count], group.seeds, group.noisy)
+    if count < width:
+        rows[:, own, count:] = rows[:, own, count - 1 : count]
+    return rows
+
+
 def _stimuli(group: Sequence[Run], schedule: Schedule, kernel: CaseKernel) -> Array | Inputs:
     """Return the runs' stimulus rows as a kernel reads them.
 
     For lanes, the shape is (rows, nu, lanes), or (rows, nu) if all are equal.
     """
     t, ranges = schedule.stimulus_times, stimulus_ranges(group[0].model)
-    shape, width = (len(group[0].model.Stimulus._fields), t.size), kernel.lanes
+    shape, width, count = (len(group[0].model.Stimulus._fields), t.size), kernel.lanes, len(group)
 
     def require_usual(signals: Array, runs: Sequence[Run]) -> None:
         is_usual = np.isfinite(signals).all() and all(
@@ -275,21 +346,51 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, kernel: CaseKernel) -> Ar
             for run in runs:
                 sampled_stimulus(run, schedule)  # raises an error with the signal and the time
 
+    noises: dict[int, Noise] = {}
+
+    def put(signals: Array, case: int) -> None:
+        noise = put_signals(signals.T, group[case], t)
+        if noise is not None:
+            noises[case] = noise
+
     def rows_of(case: int) -> Array:
         signals = np.zeros(shape)
-        put_into(signals.T, group[case], t)
+        put(signals, case)
         require_usual(signals[None], group[case : case + 1])
         return signals
 
     if kernel.shares_stimuli:
-        return Inputs.of(rows_of, len(group), width)
+        inputs = Inputs.of(rows_of, count, width)
+        noise = _noise_rows(*_seeds_of(noises), width, t.size) if noises else {}
+        return inputs.with_noise(noise)
     signals = np.zeros((width, *shape))  # each contiguous
-    for lane, run in enumerate(group):
-        put_into(signals[lane].T, run, t)
-    signals[len(group) :] = signals[len(group) - 1]
+    for lane in range(count):
+        put(signals[lane], lane)
+    signals[count:] = signals[count - 1]
     require_usual(signals, group)
+    if noises:
+        rows = signals.transpose(2, 1, 0).copy()
+        put_noises(rows.transpose(2, 0, 1)[:count], *_seeds_of(noises))
+        rows[:, :, count:] = rows[:, :, count - 1 : count]
+        return rows
     is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
     return (signals[0].T if is_shared else signals.transpose(2, 1, 0)).copy()
+
+
+def _seeds_of(noises: Mapping[int, Noise]) -> tuple[NDArray[np.uint64], tuple[int, ...]]:
+    """Return the seeds of runs of one model, shape (runs, numbers), and their noisy columns."""
+    each = [noises[k] for k in range(len(noises))]
+    return np.array([noise.seed for noise in each], dtype=np.uint64), each[0].columns
+
+
+def _noise_rows(
+    seeds: NDArray[np.uint64], columns: tuple[int, ...], width: int, samples: int
+) -> dict[int, Array]:
+    """Return the noise of all cases by column, shape (width, samples); idle ones repeat a case."""
+    rows, count = np.empty((len(columns), width, samples)), len(seeds)
+    put_noises(rows.transpose(1, 2, 0)[:count], seeds, range(len(columns)))
+    rows[:, count:] = rows[:, count - 1 : count]
+    return dict(zip(columns, rows, strict=True))
 
 
 class _Carried:
@@ -299,16 +400,29 @@ class _Carried:
     """
 
     def __init__(
-        self, kernel: CaseKernel, schedule: Schedule, group: Sequence[Run], jumping: Array
+        self,
+        kernel: CaseKernel,
+        schedule: Schedule,
+        group: Sequence[Run],
+        jumping: Array,
+        room: _Room,
     ) -> None:
         self._kernel, self._schedule, self._jumping = kernel, schedule, jumping
         self._books = len(jumping) if jumping.any() else 0
         self._count, width = len(group), kernel.lanes
+        self._changes: dict[int, list[tuple[int, ParameterSet]]] = {}
+        if isinstance(group, RunTable):
+            lanes = np.minimum(np.arange(width), self._count - 1)  # idle lanes repeat the last run
+            vector = initial_vectors(kernel.layout, group.states[lanes], group.memories[lanes])
+            self._vector = vector.T.copy()
+            self._parameters = group.parameters[lanes].T.copy()
+            self._stimulus = _shared_stimuli(group, kernel, room)
+            self._most = np.full(width, group.like.most_work)
+            return
         filled = [*group, *[group[-1]] * (width - len(group))]  # idle lanes repeat the last run
         states, memories = [run.state for run in filled], [run.memory for run in filled]
         self._vector = initial_vectors(kernel.layout, states, memories).T.copy()
         self._parameters = leaf_table([run.par for run in filled]).T.copy()
-        self._changes: dict[int, list[tuple[int, ParameterSet]]] = {}
         for lane, run in enumerate(filled):
             for begin, _, par in pieces(run.par, run.changes, schedule) if run.changes else ():
                 self._changes.setdefault(begin, []).append((lane, par))
@@ -316,17 +430,25 @@ class _Carried:
         self._most = np.array([run.most_work for run in filled])
 
     def to_the_end(
-        self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch, ends: Ends | None
+        self,
+        values: Array | HeldRows,
+        edges: Sequence[int],
+        skipped: int,
+        watch: _Watch,
+        ends: Ends | None,
     ) -> Array:
         """Advance the runs to their end; fill ``values`` and return the state vectors."""
         schedule, every = self._schedule, self._schedule.record_frames
         silent = replace(schedule, record_frames=schedule.frames + 1)  # except for the first row
         for begin, end in pairwise(edges):
             first = -(-begin // every) - skipped
-            self._change(begin, values[:, :, max(first, 0) :])
+            if begin in self._changes and isinstance(values, np.ndarray):
+                self._change(begin, values[:, :, max(first, 0) :])
             last = (schedule.rows if end == schedule.frames else -(-end // every)) - skipped
             signals = values.shape[0] - self._books
-            if first >= 0:
+            if first >= 0 and not isinstance(values, np.ndarray):
+                self._advance(schedule, values.window(first), begin, end, ends)
+            elif first >= 0:
                 rows = values[:signals, :, first : max(last, first + 1)].transpose(1, 2, 0)
                 self._advance(schedule, rows, begin, end, ends)
             else:
@@ -343,9 +465,7 @@ class _Carried:
 
     def _change(self, begin: int, rows: Array) -> None:
         """Set the parameters that apply from a frame, and record the work of the change."""
-        here = self._changes.get(begin, ())
-        if not here:
-            return
+        here = self._changes[begin]
         before = self._energies(rows) if self._books and begin else None
         for lane, par in here:
             self._parameters[:, lane] = list(par.leaves().values())
@@ -362,7 +482,7 @@ class _Carried:
         return np.array([row[:, 0, book > 0].sum(axis=-1) for book in self._jumping])
 
     def _advance(
-        self, plan: Schedule, rows: Array, begin: int, end: int, ends: Ends | None = None
+        self, plan: Schedule, rows: Any, begin: int, end: int, ends: Ends | None = None
     ) -> None:
         self._kernel.advance(
             plan, self._parameters, self._stimulus, self._vector, rows, end, begin, ends
@@ -401,7 +521,8 @@ def case_matrix(run: Run, variations: Variations) -> Array:
             value=str(lengths),
         )
     count = next(iter(lengths.values()))
-    matrix = np.repeat(np.array(list(run.par.leaves().values()))[:, None], count, axis=1)
+    matrix = np.empty((len(names), count))
+    matrix[:] = np.array(list(run.par.leaves().values()))[:, None]
     for name, array in arrays.items():
         _check_extremes(run, name, array)
         matrix[names.index(name)] = array
@@ -538,8 +659,9 @@ def simulate_ensemble(
     def group(first: int) -> None:
         cases = np.arange(first, first + kernel.lanes)
         vector = np.repeat(start[:, None], kernel.lanes, axis=1)
-        # Lanes beyond the last case repeat this case.
-        columns = np.ascontiguousarray(matrix[:, np.minimum(cases, count - 1)])
+        columns = matrix[:, first : first + kernel.lanes]
+        beyond = kernel.lanes - columns.shape[1]  # lanes that repeat the last case
+        columns = np.concatenate((columns, np.repeat(columns[:, -1:], beyond, axis=1)), axis=1)
         rows = values[cases[0] : cases[-1] + 1]
         kernel.advance(schedule, columns, stimulus, vector, rows, schedule.frames)
         last = min(cases[-1], count - 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -112,6 +112,10 @@ class Inputs:
             values[k] = rows
         return cls(tuple(values))
 
+    def with_noise(self, noise: Mapping[int, Array]) -> Inputs:
+        """Return these inputs with other numbers by column, shape (cases, rows) each."""
+        return Inputs(tuple(noise.get(k, values) for k, values in enumerate(self.values)))
+
 
 def plan_array(schedule: Schedule, begin: int, end: int, selected: int) -> NDArray[np.int64]:
     """Return the kernel's plan for the frames from begin to end, with the row at the run's end."""
@@ -169,6 +173,12 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
+def rows_pointer(rows: NDArray[Any]) -> Callable[[int], ctypes.c_void_p]:
+    """Return a function of a row's number that returns the row's address."""
+    first, size = pointer(rows).value or 0, rows.strides[0]
+    return lambda row: ctypes.c_void_p(first + row * size)
+
+
 def text_digest(text: str) -> str:
     """Return the digest of a kernel's C code without comments."""
     return hashlib.sha256(_COMMENT.sub("", text).encode()).hexdigest()
@@ -208,20 +218,13 @@ class SingleKernel:
         rows
             Shape (recorded rows of these frames, selected outputs).
         """
+        step = ctypes.c_double(request.schedule.step)
+        inputs = (pointer(request.parameters), step, pointer(request.stimulus), pointer(state))
+        selection, row_at = pointer(request.selection), rows_pointer(rows)
 
         def call(first: int, last: int, row: int) -> int:
             plan = plan_array(request.schedule, first, last, request.selection.size)
-            return int(
-                self._run(
-                    pointer(request.parameters),
-                    ctypes.c_double(request.schedule.step),
-                    pointer(request.stimulus),
-                    pointer(state),
-                    pointer(plan),
-                    pointer(request.selection),
-                    pointer(rows[row:]),
-                )
-            )
+            return int(self._run(*inputs, pointer(plan), selection, row_at(row)))
 
         run_in_calls(request.schedule, begin, end, call)
 

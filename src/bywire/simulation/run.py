@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -31,6 +31,7 @@ from bywire.simulation.advance import (
 from bywire.simulation.contacts import unresolved
 from bywire.simulation.engine import Engine, prepare
 from bywire.simulation.native import BufferedCall, Request
+from bywire.simulation.noise import Noise
 from bywire.simulation.schedule import Layout, Schedule, plan
 
 Status = Literal["done", "interrupted", "unsettled"]
@@ -114,7 +115,8 @@ class Trajectory:
     @cached_property
     def doubt(self) -> str:
         """Reason why the result may be wrong although all substeps settled; empty if none."""
-        return doubts_of([self.run])[0]
+        run = self.run
+        return contact_doubts(run, [run.state], [run.memory], leaf_table([run.par]))[0]
 
     def __getitem__(self, name: str) -> Array:
         """Return one signal, shape (rows,)."""
@@ -126,7 +128,9 @@ def initial_vector(layout: Layout, state: Sequence[float], memory: Sequence[floa
     return np.asarray(initial_vectors(layout, [state], [memory])[0])
 
 
-def initial_vectors(layout: Layout, states: Sequence[Any], memories: Sequence[Any]) -> Array:
+def initial_vectors(
+    layout: Layout, states: Sequence[Any] | Array, memories: Sequence[Any] | Array
+) -> Array:
     """Return the state vectors at the start of several runs, shape (runs, entries)."""
     vectors = np.zeros((len(states), layout.total))
     for kind, values in (("x", np.array(states)), ("m", np.array(memories))):
@@ -254,25 +258,36 @@ def _advanced_in_pieces(
     return finished, put_in
 
 
-def doubts_of(runs: Sequence[Run]) -> list[str]:
+def contact_doubts(
+    run: Run, states: Sequence[Any] | Array, memories: Sequence[Any] | Array, table: Array
+) -> list[str]:
     """Return why the step may be too long for each run's contacts, judged at the run's start.
 
-    ``runs``: runs with the same structure and step.
+    Parameters
+    ----------
+    run
+        One of several runs with the same structure and step.
+    states, memories
+        Initial values of each run, shape (runs, entries) each.
+    table
+        Numbers of their parameter sets, shape (runs, leaves).
     """
-    first = runs[0]
-    if not first.model.compliance(first.par):
-        return [""] * len(runs)
-    jacobians = prepare(first.model, first.par).contact_jacobians
-    computed, table = BufferedCall(jacobians), leaf_table([run.par for run in runs])
-    each = [
-        np.concatenate(computed(run.state, run.memory, values))
-        for run, values in zip(runs, table, strict=True)
-    ]
+    count = len(table)
+    if not run.model.compliance(run.par):
+        return [""] * count
+    jacobians = prepare(run.model, run.par).contact_jacobians
     patterns = [jacobians.sparsity_out(k) for k in range(jacobians.n_out())]
-    ends = np.cumsum([pattern.nnz() for pattern in patterns])
-    entries = np.split(np.array(each), ends[:-1], axis=1)
+    computed = BufferedCall(_mapped(jacobians, count))
+    given = (np.ravel(np.asarray(each, dtype=float)) for each in (states, memories, table))
+    entries = (each.reshape(count, -1) for each in computed(*given))
     opened, *closed = map(_matrices, patterns, entries)
-    return unresolved(opened, closed, first.step)
+    return unresolved(opened, closed, run.step)
+
+
+@lru_cache(maxsize=16)
+def _mapped(function: Any, count: int) -> Any:
+    """Return a CasADi function of the arguments of several runs at a time."""
+    return function.map(count) if count > 1 else function
 
 
 def _matrices(pattern: Any, entries: Array) -> Array:
@@ -326,16 +341,19 @@ def stimulus_ranges(model: Model) -> list[tuple[int, float, float]]:
     return [(fields.index(n), *ends) for n, ends in ranges_of(model.Stimulus).items()]
 
 
-def put_into(rows: Array, run: Run, t: Array) -> None:
+def put_signals(rows: Array, run: Run, t: Array) -> Noise | None:
     """Write a run's stimulus at times [s] to rows of zeros, shape (len(t), nu).
 
-    A stimulus with a method ``put_into(rows, t)`` may skip signals that are zero.
+    A stimulus with a method ``put_into(rows, t)`` may skip signals that are zero. Its attribute
+    ``noise`` describes the noise that this method leaves out, and that this function returns.
     """
     put = getattr(run.stimulus, "put_into", None)
     if put is None:
         rows[:] = run.stimulus(t)
-    else:
-        put(rows, t)
+        return None
+    put(rows, t)
+    noise: Noise = getattr(run.stimulus, "noise")  # noqa: B009 - not every stimulus has it
+    return noise if noise.columns else None
 
 
 def selected(names: Sequence[str], signals: Sequence[str]) -> NDArray[np.int32]:

@@ -127,6 +127,23 @@ def _planned(
     )
 
 
+def longest_step(intervals: Iterable[float]) -> float:
+    """Return the longest step [s] that divides several intervals.
+
+    Examples
+    --------
+    >>> longest_step([1e-3, 2e-4, 1 / 3000])
+    6.66666666666667e-05
+    """
+    first, *others = intervals
+    common = first
+    for each in others:
+        rest = each
+        while rest > _REST * first:
+            common, rest = rest, abs(math.remainder(common, rest))
+    return float(f"{first / round(first / common):.15g}")
+
+
 def _divided(frame: int) -> int:
     """Return the largest divisor of a frame's number of substeps within the limit."""
     shares = range(-(-frame // _FRAME), math.isqrt(frame) + 1)

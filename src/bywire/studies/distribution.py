@@ -1,6 +1,7 @@
 """Distributions of quantities: laws in closed form, discrete values, and their form in files.
 
-``scipy.stats`` takes as long to load as the rest of a study, in each of its processes.
+``scipy.stats`` takes as long to load as the rest of a study, in each of its processes. Even
+``scipy.special`` takes a tenth of a run's time, and runs load this module without a distribution.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from bywire.bench.changes import refuse_share_of_temperature, share_of
 from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
@@ -86,10 +86,14 @@ class Normal:
 
     def cdf(self, x: float) -> float:
         """Return the probability below."""
+        from scipy import special
+
         return float(special.ndtr((x - self.mean) / self.sd))
 
     def sf(self, x: float) -> float:
         """Return the probability above."""
+        from scipy import special
+
         return float(special.ndtr((self.mean - x) / self.sd))
 
 
@@ -110,10 +114,14 @@ class LogNormal:
 
     def cdf(self, x: float) -> float:
         """Return the probability below."""
+        from scipy import special
+
         return float(special.ndtr(self._score(x)))
 
     def sf(self, x: float) -> float:
         """Return the probability above."""
+        from scipy import special
+
         return float(special.ndtr(-self._score(x)))
 
     def _score(self, x: float) -> float:
@@ -159,6 +167,8 @@ def truncated_normal(low: float, high: float, mean: float, sd: float) -> Law:
 
 def normal_quantile(share: Any) -> Any:
     """Return the standard normal score of a cumulative probability."""
+    from scipy import special
+
     return special.ndtri(share)
 
 
@@ -178,6 +188,8 @@ def binomial_ranks(count: int, probability: float, beyond: float) -> tuple[int, 
         The smallest count that is not exceeded with at least this probability, and the smallest
         count that is exceeded with at most this probability.
     """
+    from scipy import special
+
     low = _least(lambda k: special.bdtr(k, count, probability) >= beyond, count)
     high = _least(lambda k: special.bdtrc(k, count, probability) <= beyond, count)
     return low, high

@@ -14,6 +14,7 @@ from functools import partial
 from itertools import islice
 from typing import Any, Generic, Protocol, TypeVar
 
+from bywire.bench.ensemble import numbers_per_case
 from bywire.cases.runner import as_completed
 from bywire.core.arguments import whole_number
 from bywire.core.brake import load_brakes, loaded_files
@@ -21,11 +22,11 @@ from bywire.core.callers import collected_warnings, option
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.libraries import allow_dask
-from bywire.core.machine import worker_count
+from bywire.core.machine import machine_memory, worker_count
 from bywire.data.file_format import library
 from bywire.simulation.engine import CUDA
-from bywire.studies.plan import StudyPlan
-from bywire.studies.store import Columns, PlacedChunk, computed_chunk, computed_chunks, number_of
+from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.store import Columns, PlacedChunk, computed_chunks
 
 _Chunks = Iterable[int | PlacedChunk]
 T = TypeVar("T")
@@ -103,16 +104,64 @@ def batched(chunks: _Chunks, size: int) -> Iterator[list[int | PlacedChunk]]:
         yield several
 
 
-def single(chunk: int | PlacedChunk, plan: StudyPlan) -> tuple[int, Columns]:
-    """Return the number and the columns of a chunk, computed on one core."""
-    return number_of(chunk), computed_chunk(plan, chunk, threads=1)
+_AHEAD = 2  # tasks in flight for each worker, so that no worker is idle
+# Chunks that are computed together share their setup, but all of their rows need memory.
+_MOST = 4
+
+_Task = tuple[float, list[tuple[int, Columns]]]
+"""result of a task: processor time [s], and its chunks"""
+
+
+class _Tasks:
+    """Tasks of several chunks, which take about the same time until few chunks are left.
+
+    Parameters
+    ----------
+    chunks
+        The chunks.
+    workers
+        Number of workers that share them.
+    seconds
+        Target processor time of a task [s].
+    most
+        Maximum number of chunks in a task.
+    """
+
+    def __init__(
+        self, chunks: _Chunks, workers: int, seconds: float, most: int | None = None
+    ) -> None:
+        self._left, self._workers = deque(chunks), workers
+        self._seconds, self._most, self._size = seconds, most, 1
+
+    def __iter__(self) -> Iterator[list[int | PlacedChunk]]:
+        while task := self.next():
+            yield task
+
+    def next(self) -> list[int | PlacedChunk]:
+        """Return the chunks of the next task; none if all are in tasks."""
+        share = -(-len(self._left) // (_AHEAD * self._workers))
+        return [self._left.popleft() for _ in range(min(self._size, share))]
+
+    def measured(self, task: _Task) -> list[tuple[int, Columns]]:
+        """Return the chunks of a finished task, whose time determines the size of the next ones."""
+        seconds, given = task
+        size = max(1, round(self._seconds * len(given) / max(seconds, 1e-9)))
+        self._size = size if self._most is None else min(size, self._most)
+        return given
+
+
+def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan, threads: int | None = 1) -> _Task:
+    """Return chunks, of which several are computed together, and their processor time."""
+    begin = time.process_time()  # does not depend on other programs, unlike the elapsed time
+    batches = (computed_chunks(plan, batch, threads) for batch in batched(chunks, _MOST))
+    given = [computed for batch in batches for computed in batch]
+    return time.process_time() - begin, given
 
 
 # --- On a cluster of dask.distributed
 
-_AHEAD = 2  # tasks in flight for each worker, so that no worker is idle
 _SECONDS = 10.0  # time limit to reach a cluster
-_TASK = 0.5  # s: target duration of a task of a cluster
+_TASK = 0.5  # s: target processor time of a task of a cluster
 # Dask works periodically: stack samples every 10 ms, ticks every 20 ms, memory checks every 100 ms.
 # A core's worker, scheduler and client use 8 % of a core for this, or 1.4 % with these settings.
 CLUSTER_SETTINGS = {
@@ -129,10 +178,6 @@ CLUSTER_MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1
 _LOST = "the cluster lost its workers ({}). Resume the study when workers are available again"
 _GONE = "the cluster's scheduler is gone. Restart it, or use other workers, and resume the study"
 _WHAT = ("studies on a cluster", "cluster")
-
-
-_Task = tuple[float, list[tuple[int, Columns]]]
-"""result of a task of a cluster: time [s], and its chunks"""
 
 
 class Cluster:
@@ -185,42 +230,31 @@ def _client(address: str) -> Iterator[Any]:
         log.setLevel(before)
 
 
-def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan) -> _Task:
-    """Return chunks one after the other, and their computing time."""
-    begin = time.perf_counter()
-    given = [single(chunk, plan) for chunk in chunks]
-    return time.perf_counter() - begin, given
-
-
 def _of_cluster(
     client: Any, plan: StudyPlan, workers: int, chunks: _Chunks
 ) -> Iterator[tuple[int, Columns]]:
     """Yield the finished chunks of a cluster, with few tasks in flight.
 
-    The overhead of a task equals some cases. A task therefore has as many chunks as take about
-    `_TASK`, but near the end no more than each worker's share.
+    The overhead of a task equals some cases, so that a task should take about `_TASK`.
     """
     distributed = library("distributed", *_WHAT)
     # Send the plan once to every worker; otherwise each task would set up the bench again.
     kept = client.scatter(plan, broadcast=True, hash=False)
-    left, size = deque(chunks), 1
+    tasks = _Tasks(chunks, workers, _TASK)
     with client.as_current():
-        tasks = distributed.as_completed(with_results=True)
+        begun = distributed.as_completed(with_results=True)
 
     def submit() -> None:
-        share = -(-len(left) // (_AHEAD * workers))
-        task = [left.popleft() for _ in range(min(size, share))]
-        if task:
-            tasks.add(client.submit(_timed, task, plan=kept, pure=False))
+        if task := tasks.next():
+            begun.add(client.submit(_timed, task, plan=kept, pure=False))
 
     try:
         for _ in range(_AHEAD * workers):
             submit()
-        for _, answer in tasks:
+        for _, answer in begun:
             if isinstance(answer, BaseException):  # a canceled task provides the reason
                 raise RunError(_lost(client, answer))
-            seconds, given = answer
-            size = max(1, round(_TASK * len(given) / seconds))
+            given = tasks.measured(answer)
             submit()
             yield from given
     except distributed.KilledWorker as error:
@@ -238,9 +272,12 @@ def _lost(client: Any, error: BaseException) -> str:
 
 # --- Choice of the executor
 
-# Chunks in one batch on a graphics processor: 4,096 cases, which for hard braking need 2 GB of this
-# machine's memory for stimuli and rows.
-_TOGETHER = 64
+_POOLED = 0.2  # s: target processor time of a task in a pool; a killed study loses its tasks
+# Chunks in one batch on a graphics processor. Up to 8,192 cases, a kernel takes as long as for one
+# case, and processes take turns. So a batch has at least 2,048 cases if there are that many, and at
+# most as many as the largest processors hold.
+_LEAST_TOGETHER, _TOGETHER = 32, 512
+_SHARE = 0.5  # of this machine's memory for the stimuli and rows of the batches of all processes
 _MOST_WORKERS = 1024
 # Minimum number of chunks that justify processes; a process that loads everything takes a second.
 _WORTH_COPIES, _WORTH = 2, 8
@@ -251,16 +288,16 @@ class _InPool:
     """Computation of chunks, and other tasks, in the processes of a pool."""
 
     pool: ProcessPoolExecutor
-    ahead: int
+    workers: int
     together: int
 
     def __call__(self, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
+        ahead = _AHEAD * self.workers
         if self.together == 1:
-            begun = as_completed(self.pool, _computed, chunks, self.ahead)
-            return (computed for _, computed in begun)
-        batches = as_completed(
-            self.pool, _computed_together, batched(chunks, self.together), self.ahead
-        )
+            tasks = _Tasks(chunks, self.workers, _POOLED, _MOST)
+            begun = as_completed(self.pool, _computed, (tuple(task) for task in tasks), ahead)
+            return (computed for _, task in begun for computed in tasks.measured(task))
+        batches = as_completed(self.pool, _computed_together, batched(chunks, self.together), ahead)
         return (computed for _, batch in batches for computed in batch)
 
     def beside(self, job: Callable[[], T]) -> Beside[T]:
@@ -280,8 +317,13 @@ class InProcess:
         self.together = together
 
     def _computed(self, plan: StudyPlan, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
-        for several in batched(chunks, self.together):
-            yield from computed_chunks(plan, several)
+        if self.together > 1:
+            for several in batched(chunks, _fitting(plan, self.together, 1)):
+                yield from computed_chunks(plan, several)
+            return
+        tasks = _Tasks(chunks, 1, _POOLED, _MOST)
+        for task in tasks:
+            yield from tasks.measured(_timed(task, plan, threads=None))
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
@@ -309,7 +351,8 @@ class Pool:
         """Return the computation; see `Executor`."""
         fewer = f"resume it with fewer {option('workers')}"
         with processes_with_brakes(self.workers, fewer, _give, plan) as pool:
-            yield _InPool(pool, _AHEAD * self.workers, self.together)
+            together = _fitting(plan, self.together, self.workers)
+            yield _InPool(pool, self.workers, together)
 
 
 def executor_of(
@@ -342,10 +385,29 @@ def executor_of(
     require_workers(workers, cluster, engine)
     if cluster:
         return Cluster(cluster)
-    count = worker_count(workers, together or chunks)
+    at_once = together or chunks
+    if engine == CUDA:
+        count = workers_on_device(workers, at_once)
+        rounds = -(-at_once // (count * _TOGETHER))
+        batch = -(-at_once // (count * rounds))
+        return Pool(count, batch) if count > 1 else InProcess(batch)
+    count = worker_count(workers, at_once)
     is_worth = workers is not None or chunks >= (_WORTH_COPIES if may_copy() else _WORTH)
-    batch = min(_TOGETHER, -(-(together or chunks) // count)) if engine == CUDA else 1
-    return Pool(count, batch) if count > 1 and is_worth else InProcess(batch)
+    return Pool(count) if count > 1 and is_worth else InProcess()
+
+
+def workers_on_device(workers: int | None, chunks: int) -> int:
+    """Return the number of processes for a number of chunks on a graphics processor."""
+    return worker_count(workers, max(chunks if workers else chunks // _LEAST_TOGETHER, 1))
+
+
+def _fitting(plan: StudyPlan, together: int, workers: int) -> int:
+    """Return the number of chunks per batch, split evenly if they exceed this machine's memory."""
+    if together == 1:
+        return 1
+    size = 8 * CHUNK * numbers_per_case(plan.bench)
+    most = max(int(_SHARE * machine_memory() / workers / size), 1)
+    return -(-together // -(-together // most))
 
 
 def require_workers(workers: int | None, cluster: str, engine: str) -> None:
@@ -388,8 +450,8 @@ def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
     return value, [each.message for each in caught if isinstance(each.message, Warning)]
 
 
-def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
-    return single(chunk, _given[0])
+def _computed(chunks: Sequence[int | PlacedChunk]) -> _Task:
+    return _timed(chunks, _given[0])
 
 
 def _computed_together(chunks: Sequence[int | PlacedChunk]) -> list[tuple[int, Columns]]:

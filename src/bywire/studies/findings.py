@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from bywire.bench.kpis.kpi import Kpi
@@ -30,10 +27,12 @@ from bywire.studies.statistics import (
     Spread,
     influences,
     judged,
+    running_sizes,
     share,
-    spread_of,
 )
-from bywire.studies.store import CASE, FAILURE, WARNINGS, warnings_in
+from bywire.studies.store import CASE, FAILURE, WARNINGS, Columns
+from bywire.studies.stored_cases import BLOCK, StoredCases
+from bywire.studies.survey import DemandTally, FigureTally, Reason, Survey
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -186,8 +185,6 @@ class Judgment:
     ----------
     demand
         The requirement.
-    met
-        Whether each case meets it, shape (cases,); a case without a result does not.
     share
         Fraction of cases that meet it, with the interval of the probability. Cases too close to the
         limit count for neither side.
@@ -198,71 +195,64 @@ class Judgment:
     worst
         Row of the worst case, or of the most probable failure in a study of rare failures. A case
         without the figure is the worst. None if no case ran, or all cases are equal.
+    lacking
+        Number of cases with a result but without the figure.
+    known, known_met
+        Number of cases with a finite figure, and of those that meet the requirement.
+    running
+        Fraction of the first cases that meet it, for rising numbers of cases.
     failure
         Probability that the requirement is missed, in a study of rare failures, where fractions of
         cases are not probabilities.
     """
 
     demand: Limit
-    met: NDArray[np.bool_]
     share: Share
     undecided: int
     outcome: Outcome
     worst: int | None
+    lacking: int
+    known: int
+    known_met: int
+    running: Sequence[Share] = field(default=(), repr=False)
     failure: FailureProbability | None = None
 
 
-def judgment_of(
-    demand: Limit,
-    figure: Array,
-    failed: NDArray[np.bool_],
-    error: float,
-    confidence: float,
-) -> Judgment:
+def judgment_of(tally: DemandTally, confidence: float) -> Judgment:
     """Return a requirement judged over all cases.
 
     Parameters
     ----------
-    demand
-        The requirement.
-    figure
-        Its key figure in every case, shape (cases,); NaN if a case does not have it.
-    failed
-        Whether a case has no result, shape (cases,).
-    error
-        Numerical error of the figure, in its unit: cases closer to the limit count for neither
-        side.
+    tally
+        Counted cases. Cases closer to the limit than the numerical error count for neither side.
     confidence
         Confidence of the interval, between 0 and 1.
     """
-    met, near = demand.is_met(figure), demand.is_near(figure, error)
-    count = figure.size
-    may, surely = (share(int(each.sum()), count, confidence) for each in (met | near, met & ~near))
+    demand, count = tally.demand, tally.cases
+    may, surely = (share(each, count, confidence) for each in (tally.may, tally.surely))
     if demand.probability is not None:
         outcome = judged(may, surely, demand.probability)
     elif may.count < count:
         outcome = "missed"
     else:
         outcome = "met" if surely.count == count else "undecided"
-    told = replace(share(int(met.sum()), count, confidence), low=surely.low, high=may.high)
-    worst = _worst(figure, failed, demand.is_upper)
-    return Judgment(demand, met, told, int(near.sum()), outcome, worst)
-
-
-def _worst(figure: Array, failed: NDArray[np.bool_], is_upper: bool) -> int | None:
-    """Return the row of the worst case by an upper or a lower limit."""
-    known = np.isfinite(figure)
-    lacking = np.flatnonzero(~known & ~failed)
-    if lacking.size:
-        return int(lacking[0])
-    if not known.any() or (known.sum() > 1 and np.ptp(figure[known]) == 0.0):
-        return None  # all cases are equal, so none is the worst
-    return int(np.argmin(np.where(known, -figure if is_upper else figure, np.inf)))
+    told = replace(share(tally.met, count, confidence), low=surely.low, high=may.high)
+    return Judgment(
+        demand,
+        told,
+        tally.near,
+        outcome,
+        tally.worst,
+        tally.lacking,
+        tally.known,
+        tally.known_met,
+        tally.shares(confidence),
+    )
 
 
 # --- All findings
 
-_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_SHARES = 100  # points of a convergence, spaced by equal ratios
 
 
 @dataclass(frozen=True, repr=False)
@@ -273,8 +263,9 @@ class Findings:
     ----------
     plan
         The study.
-    cases
-        One row for each computed case; see `bywire.studies.store.computed_chunk`.
+    source
+        One row for each computed case, in memory or in the folder of a large study; see
+        `bywire.studies.store.computed_chunk`.
     nominal
         Key figures of the bench itself, with their numerical error.
     rare
@@ -284,13 +275,46 @@ class Findings:
     """
 
     plan: StudyPlan
-    cases: pd.DataFrame
+    source: pd.DataFrame | StoredCases
     nominal: tuple[Kpi, ...]
     rare: tuple[RareFailure, ...] = ()
     searches: tuple[WorstCase, ...] = ()
 
     def __repr__(self) -> str:
-        return f"<Findings of {self.plan.name}: {len(self.cases)} cases>"
+        return f"<Findings of {self.plan.name}: {self.count} cases>"
+
+    @property
+    def count(self) -> int:
+        """Number of computed cases."""
+        return self.source.count if isinstance(self.source, StoredCases) else len(self.source)
+
+    @cached_property
+    def cases(self) -> pd.DataFrame:
+        """All cases; for a large study, read from its folder when they are first used."""
+        return self.source.frame() if isinstance(self.source, StoredCases) else self.source
+
+    @cached_property
+    def first(self) -> pd.DataFrame:
+        """The first cases: all, or at least `BLOCK` cases of a large study."""
+        import pandas as pd
+
+        if not isinstance(self.source, StoredCases):
+            return self.source[:BLOCK]
+        return pd.DataFrame(next(self.source.blocks()))
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of all columns of the cases."""
+        return [str(name) for name in self.first]
+
+    def blocks(self, names: Sequence[str]) -> Iterator[Columns]:
+        """Yield the named columns of all cases block by block, shape (cases of the block,) each."""
+        if isinstance(self.source, StoredCases):
+            yield from self.source.blocks(names)
+            return
+        columns = {name: np.asarray(self.source[name]) for name in names if len(self.source)}
+        for begin in range(0, len(self.source), BLOCK):
+            yield {name: column[begin : begin + BLOCK] for name, column in columns.items()}
 
     @cached_property
     def units(self) -> Mapping[str, str]:
@@ -307,7 +331,8 @@ class Findings:
             For a figure that the study does not have.
         """
         self._require(name)
-        return np.asarray(self.cases[name], dtype=float)
+        each = [np.asarray(block[name], dtype=float) for block in self.blocks([name])]
+        return np.concatenate(each) if each else np.empty(0)
 
     def size(self, name: str) -> float:
         """Return the maximum magnitude of a key figure; 0 if it is undefined in all cases."""
@@ -322,39 +347,68 @@ class Findings:
     @cached_property
     def judgments(self) -> tuple[Judgment, ...]:
         """Every requirement, in the order of the file."""
+        judgments = tuple(judgment_of(t, self.plan.confidence) for t in self._survey.demands)
         if self.rare:
-            return tuple(map(self._rare_judgment, self.rare))
-        return tuple(map(self._judgment, self.plan.demands))
+            return tuple(map(self._rare_judgment, self.rare, judgments))
+        return judgments
+
+    @cached_property
+    def _survey(self) -> Survey:
+        """Counts and extremes of all cases."""
+        demands = [each.demand for each in self.rare] or self.plan.demands
+        sizes = running_sizes(self.count, _SHARES)
+        survey = Survey(
+            {name: FigureTally() for name in self.units},
+            [DemandTally(each, self._error(each.figure), sizes) for each in demands],
+        )
+        varied = [v.name for v in self.plan.varied if v.unit]
+        numbers = [*self.units, *varied]
+        for block in self.blocks([*numbers, FAILURE, WARNINGS]):
+            columns = {name: np.asarray(block[name], dtype=float) for name in numbers}
+            texts = [np.asarray(block[name], dtype=object) for name in (FAILURE, WARNINGS)]
+            survey.add(columns, varied, *texts)
+        return survey
 
     @cached_property
     def spreads(self) -> tuple[Spread, ...]:
         """Every key figure that is defined in at least one case."""
+        defined = {name: each for name, each in self._survey.figures.items() if each.count}
+        for tally in defined.values():
+            tally.expect(self.plan.confidence)
+        for block in self.blocks(list(defined)) if defined else ():
+            for name, tally in defined.items():
+                tally.add_again(np.asarray(block[name], dtype=float))
         nominal = {kpi.name: kpi.value for kpi in self.nominal}
         return tuple(
-            spread_of(
-                name, unit, nominal.get(name, math.nan), self.figure(name), self.plan.confidence
-            )
-            for name, unit in (self.units if len(self.cases) else {}).items()
-            if np.isfinite(self.figure(name)).any()
+            tally.spread(name, self.units[name], nominal.get(name, math.nan), self.count)
+            for name, tally in defined.items()
         )
+
+    @property
+    def ends(self) -> Mapping[str, tuple[float, float]]:
+        """Least and largest value of each varied number [SI], and of each defined key figure."""
+        figures = {each.name: (each.least, each.largest) for each in self.spreads}
+        return self._survey.ends | figures
 
     def influences(self, name: str) -> Sequence[Influence | ChoiceInfluence]:
         """Return the relations of a key figure to the quantities, the strongest first.
 
         Choices have no order. Their correlation ratio is ranked among magnitudes of rank
-        correlations.
+        correlations. For a large study, relations and intervals come from the `first` cases.
         """
+        self._require(name)
         known, plan = self._influences, self.plan
         if name not in known:
             varied = [v.name for v in plan.varied if v.unit]
-            columns = [np.asarray(self.cases[each], dtype=float) for each in varied]
-            figure, confidence = self.figure(name), plan.confidence
+            columns = [np.asarray(self.first[each], dtype=float) for each in varied]
+            figure = np.asarray(self.first[name], dtype=float) if self.count else np.empty(0)
+            confidence = plan.confidence
             found: list[Influence | ChoiceInfluence] = [
                 *influences(varied, columns, figure, confidence, bool(plan.correlations))
             ]
             for v in plan.varied:
                 if not v.unit and (
-                    each := choice_influence(v.name, self.cases[v.name], figure, confidence)
+                    each := choice_influence(v.name, self.first[v.name], figure, confidence)
                 ):
                     found.append(each)
             known[name] = sorted(found, key=lambda each: -each.strength)
@@ -391,7 +445,7 @@ class Findings:
     def effects(self, name: str) -> Sequence[Effect]:
         """Return the effect of each quantity alone on a key figure, if the design shows it."""
         self._require(name)
-        if self.plan.design != ONE or not len(self.cases):
+        if self.plan.design != ONE or not self.count:
             return []
         columns = [self.cases[v.name].tolist() for v in self.plan.varied]
         return effects(self.plan.varied, self.plan.levels, columns, self.figure(name))
@@ -415,53 +469,60 @@ class Findings:
             return [each.quantity for each in self.effects(name) if each.swing or each.lacking]
         return [each.quantity for each in self.influences(name) if each.strength]
 
-    @cached_property
-    def failures(self) -> Mapping[int, str]:
-        """Reason why a case has no result, by row."""
-        texts = self._texts(FAILURE)
-        return {k: texts[k] for k in np.flatnonzero(self._failed).tolist()}
-
-    @cached_property
-    def _failed(self) -> NDArray[np.bool_]:
-        """Whether each case has no result, shape (cases,); stored, since it reads many texts."""
-        return np.asarray(self._texts(FAILURE) != "")
+    @property
+    def met(self) -> int:
+        """Number of cases that meet all requirements."""
+        return self._survey.met
 
     @property
-    def reasons(self) -> Mapping[str, Sequence[int]]:
-        """Rows of cases without a result, by reason; reasons that differ only in numbers merge."""
-        rows_by_text: dict[str, list[int]] = {}
-        for row, text in self.failures.items():
-            rows_by_text.setdefault(_NUMBER.sub("#", text), []).append(row)
-        return {self.failures[rows[0]]: rows for rows in rows_by_text.values()}
+    def failed(self) -> int:
+        """Number of cases without a result."""
+        return self._survey.failed
 
-    @cached_property
+    @property
+    def reasons(self) -> Sequence[Reason]:
+        """Reasons why cases have no result."""
+        return self._survey.reasons.reasons
+
+    @property
     def warnings(self) -> Mapping[str, int]:
         """Number of cases by warning; warnings that differ only in numbers merge."""
-        said: dict[str, Counter[str]] = {}
-        for text, cases in Counter(self._texts(WARNINGS).tolist()).items():
-            for each in warnings_in(text):
-                said.setdefault(_NUMBER.sub("#", each), Counter())[each] += cases
+        tally = self._survey.warnings
         return {
-            next(iter(each)) + ", and so on" * (len(each) > 1): each.total()
-            for each in said.values()
+            text + ", and so on" * (kind in tally.several): tally.cases[kind]
+            for kind, text in tally.first.items()
         }
 
     def _require(self, name: str) -> None:
         if name not in self.units:
             raise unknown_name("key figure", str(name), self.units)
 
-    def _texts(self, column: str) -> NDArray[np.object_]:
-        """Return a text of every case, shape (cases,); pandas would be slow row by row."""
-        return np.asarray(self.cases[column] if len(self.cases) else (), dtype=object)
+    def row(self, row: int) -> Mapping[str, float | str]:
+        """Return all columns of a case, by its row."""
+        if row not in self._rows:
+            if isinstance(self.source, StoredCases):
+                self._rows[row] = {n: x[0] for n, x in self.source.row(row).items()}
+            else:
+                self._rows[row] = {str(n): self.source[n].iloc[row] for n in self.source}
+        return self._rows[row]
+
+    @cached_property
+    def _rows(self) -> dict[int, Mapping[str, float | str]]:
+        """Cases by row, stored since each needs a file."""
+        return {}
 
     def number(self, row: int) -> int:
         """Return the number of a case by its row."""
-        return int(self.cases[CASE].iloc[row])
+        return int(self.row(row)[CASE])
 
     def values(self, row: int) -> dict[str, float | str]:
         """Return the varied values of a case [SI]."""
         names = [name for v in self.plan.varied for name in (v.name, *v.together)]
-        return {name: self.cases[name].iloc[row] for name in names}
+        return {name: self.row(row)[name] for name in names}
+
+    def has_result(self, row: int) -> bool:
+        """Return whether a case has a result, by its row."""
+        return self.row(row)[FAILURE] == ""
 
     @cached_property
     def _sensitivities(self) -> dict[str, Sensitivity]:
@@ -473,9 +534,9 @@ class Findings:
         """Influences by key figure, likewise."""
         return {}
 
-    def _rare_judgment(self, rare: RareFailure) -> Judgment:
+    def _rare_judgment(self, rare: RareFailure, among: Judgment) -> Judgment:
         """Return a requirement for a design in which fractions of cases are not probabilities."""
-        among, wanted = self._judgment(rare.demand), rare.demand.probability
+        wanted = rare.demand.probability
         assert wanted is not None
         numbers, error = np.asarray(self.cases[CASE]), self._error(rare.demand.figure)
         return replace(
@@ -490,10 +551,7 @@ class Findings:
         error = {kpi.name: kpi.bound for kpi in self.nominal}.get(name, math.nan)
         return 0.0 if math.isnan(error) else error
 
-    def is_close(self, demand: Limit) -> NDArray[np.bool_]:
-        """Return a mask of the cases closer to a limit than their figure's numerical error."""
-        return demand.is_near(self.figure(demand.figure), self._error(demand.figure))
-
-    def _judgment(self, demand: Limit) -> Judgment:
-        figure, error = self.figure(demand.figure), self._error(demand.figure)
-        return judgment_of(demand, figure, self._failed, error, self.plan.confidence)
+    def is_close(self, demand: Limit, row: int) -> bool:
+        """Return whether a case is closer to a limit than its figure's numerical error."""
+        figure = np.asarray(self.row(row)[demand.figure], dtype=float)
+        return bool(demand.is_near(figure, self._error(demand.figure)))

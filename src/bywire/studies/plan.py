@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.computation import computation
+from bywire.bench.computation import bench_identity
 from bywire.bench.requirements import Limit
 from bywire.cases.identity import as_json, digest_of
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
-from bywire.core.version import __version__
 from bywire.studies.designs import (
     MORRIS,
     RARE,
@@ -300,19 +299,7 @@ class StudyPlan:
         """Everything that affects the figures of its cases."""
         bench = self.bench
         identity: dict[str, Any] = {
-            "version": __version__,
-            "computed": computation(bench, self._choices),
-            "experiment": bench.experiment,
-            "system": bench.system,
-            "parameters": bench.par.flat(),
-            "options": bench.chosen_options.flat(),
-            "stimuli": {
-                name: [each.kind, each.parameters.model_dump(mode="json")]
-                for name, each in bench.chosen_stimuli.items()
-            },
-            "step": bench.step,
-            "record": bench.record,
-            "noise": bench.seed,
+            **bench_identity(bench, self._choices),
             "order": [v.name for v in self.varied],
             "varied": {
                 v.name: [
@@ -328,8 +315,6 @@ class StudyPlan:
             "chunk": CHUNK,
             "levels": 0 if self.is_sampled else self.levels,
         }
-        if bench.faults:
-            identity["faults"] = bench.faults
         if self.sensitivity is not None:
             # Indices use all groups together. The identity includes the points, since a library
             # draws them.

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from bywire.bench import running
 from bywire.bench.running import Result
+from bywire.core.callers import option
 from bywire.core.copies import may_copy, processes_with_brakes
+from bywire.core.errors import DeviceError, ParameterError
 from bywire.core.typing import Progress
-from bywire.simulation.cuda import find_device
+from bywire.simulation.cuda_device import find_device
 from bywire.simulation.engine import CUDA
 from bywire.studies.designs import WORST
-from bywire.studies.executor import executor_of, require_workers
+from bywire.studies.executor import executor_of, require_workers, workers_on_device
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.sought_cases import rare_failures, worst_cases
 from bywire.studies.store import Origin, StudyStore
@@ -36,22 +38,33 @@ class Completed:
     damaged: int
 
 
-def _require_device() -> None:
-    """Fail if there is no graphics processor.
+def _allowed_workers(workers: int | None, chunks: int) -> int | None:
+    """Return the number of processes on the graphics processor, or fail if there is none.
 
     A copy of this process looks for it if workers will be copies too, because copies of a process
     that has used the driver cannot use it.
     """
-    if not may_copy():
-        find_device()
-        return
-    with processes_with_brakes(1, "check the driver") as pool:
-        pool.submit(find_device_name).result()
+    if workers_on_device(workers, chunks) > 1 and may_copy():
+        with processes_with_brakes(1, "check the driver") as pool:
+            label = pool.submit(_exclusive_device).result()
+    else:
+        label = _exclusive_device()
+    if label and workers is not None and workers > 1:
+        raise ParameterError(
+            f"workers = {workers} is not valid: it must be 1, because the compute mode of {label} "
+            f"allows only one process. Remove {option('workers')}, or have an administrator type "
+            "'nvidia-smi -c DEFAULT'",
+            name=option("workers"),
+            value=str(workers),
+            valid="1",
+        )
+    return 1 if label else workers
 
 
-def find_device_name() -> str:
-    """Return the name of the graphics processor, which workers can send."""
-    return str(find_device().label)
+def _exclusive_device() -> str:
+    """Return the name of the graphics processor if only one process may use it, or nothing."""
+    device = find_device()
+    return str(device.label) if device.is_exclusive else ""
 
 
 def complete(
@@ -91,15 +104,42 @@ def complete(
     RunError
         If the bench itself fails, or all workers are lost.
     DeviceError
-        If the bench needs a graphics processor, and there is none.
+        If the bench needs a graphics processor, and there is none, or it fails. Finished chunks
+        remain.
     KeyboardInterrupt
         If interrupted. Finished chunks remain.
     """
     until = time.monotonic() + plan.time
     require_workers(workers, cluster, plan.bench.engine)
     if plan.bench.engine == CUDA:
-        _require_device()  # fails here, before the folder is created
-    store.open(plan, origin)
+        workers = _allowed_workers(workers, plan.chunks)  # fails here, before the folder is created
+    claim: Callable[[], object] = partial(store.open, plan, origin)
+    if store.folder.exists() or plan.sought is not None:
+        claim()
+        claim = tuple
+    try:
+        return _completed(plan, store, workers, cluster, progress, (claim, meanwhile), until)
+    except DeviceError as error:
+        if not store.folder.exists():
+            raise
+        kept = f"Finished chunks are saved: type '{store.resume_command}' to continue"
+        raise error.reworded(f"{error}. {kept}") from None
+
+
+def _completed(
+    plan: StudyPlan,
+    store: StudyStore,
+    workers: int | None,
+    cluster: str,
+    progress: Progress,
+    meanwhile: Sequence[Callable[[], object]],
+    until: float,
+) -> Completed:
+    """Compute the bench itself and the missing chunks; see `complete`.
+
+    ``meanwhile``: called before the first chunk is stored. For a new folder, the first function
+    claims it, which takes as long as several chunks because the identity covers all definitions.
+    """
     damaged = store.drop_damaged()
     itself = partial(running.run, plan.bench, estimate_error=True)
     if plan.sought is not None:
@@ -120,7 +160,8 @@ def complete(
     with executor.opened(plan) as compute:
         nominal_run = compute.beside(itself)
         computed = compute(missing)
-        meanwhile()
+        for each in meanwhile:
+            each()
         for count, (chunk, columns) in enumerate(computed, 1):
             store.write(chunk, columns, plan.column_units)
             progress(label, (done + count) / plan.chunks)

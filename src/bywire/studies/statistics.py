@@ -108,23 +108,62 @@ class Quantile:
     high: float
 
 
-def quantile(values: Array, probability: float, confidence: float) -> Quantile:
-    """Return a quantile of independent values with a distribution-free interval.
+@dataclass(frozen=True)
+class QuantileRanks:
+    """Ranks of the values that determine a quantile and its interval, 0 for the least value.
+
+    Parameters
+    ----------
+    probability
+        Fraction of the values below it.
+    at
+        Position of the quantile between two ranks.
+    low, high
+        Ends of its interval; None if there are too few values.
+    """
+
+    probability: float
+    at: float
+    low: int | None
+    high: int | None
+
+    @property
+    def ranks(self) -> list[int]:
+        """All ranks."""
+        each = (math.floor(self.at), math.ceil(self.at), self.low, self.high)
+        return [rank for rank in each if rank is not None]
+
+    def quantile(self, ordered: Callable[[int], float]) -> Quantile:
+        """Return the quantile from ``ordered(rank)``, the value of each rank."""
+        first, last = ordered(math.floor(self.at)), ordered(math.ceil(self.at))
+        part, step = self.at - math.floor(self.at), last - first
+        # as NumPy's quantile, which returns the values themselves at both ends
+        value = last - step * (1.0 - part) if part >= 0.5 else first + step * part
+        low, high = (math.nan if r is None else ordered(r) for r in (self.low, self.high))
+        return Quantile(self.probability, value, low, high)
+
+
+def quantile_ranks(count: int, probability: float, confidence: float) -> QuantileRanks:
+    """Return the ranks of a quantile of independent values, with a distribution-free interval.
 
     W. J. Conover, Practical Nonparametric Statistics (1999), section 3.2: order statistics, with
     ranks from the binomial distribution.
+
+    Parameters
+    ----------
+    count
+        Number of values, >= 1.
+    probability
+        Fraction of the values below the quantile.
+    confidence
+        Confidence of the interval.
     """
-    if not values.size:
-        return Quantile(probability, math.nan, math.nan, math.nan)
-    beyond = 0.5 * (1.0 - confidence)
-    low, above = binomial_ranks(values.size, probability, beyond)
-    below = low - 1
-    ordered = np.sort(values)
-    return Quantile(
+    low, high = binomial_ranks(count, probability, 0.5 * (1.0 - confidence))
+    return QuantileRanks(
         probability,
-        float(np.quantile(values, probability)),
-        float(ordered[below]) if below >= 0 else math.nan,
-        float(ordered[above]) if above < values.size else math.nan,
+        (count - 1) * probability,
+        low - 1 if low > 0 else None,
+        high if high < count else None,
     )
 
 
@@ -227,10 +266,9 @@ def _correlation(x: Array, y: Array) -> float:
     return xy / size if size > 1e-9 * x.size**3 else 0.0
 
 
-def running_share(met: NDArray[np.bool_], confidence: float, count: int = 60) -> list[Share]:
-    """Return the convergence of an estimate: its value for a growing number of first cases."""
-    sizes = np.unique(np.geomspace(1, max(met.size, 1), count).astype(int))
-    return [share(int(met[:n].sum()), int(n), confidence) for n in sizes if met.size]
+def running_sizes(cases: int, count: int = 60) -> NDArray[np.int64]:
+    """Return rising numbers of first cases, for the convergence of an estimate."""
+    return np.unique(np.geomspace(1, max(cases, 1), count).astype(np.int64))
 
 
 # --- Spread of a key figure over the cases
@@ -257,6 +295,8 @@ class Spread:
         Quantiles at `QUANTILES`, with intervals.
     least, largest
         Extreme values.
+    counts, edges
+        Histogram: number of cases in each bin, and the edges of the bins.
     """
 
     name: str
@@ -268,32 +308,27 @@ class Spread:
     quantiles: tuple[Quantile, ...]
     least: float
     largest: float
+    counts: NDArray[np.int64]
+    edges: Array
 
 
-def spread_of(name: str, unit: str, nominal: float, figure: Array, confidence: float) -> Spread:
-    """Return the spread of a key figure that is defined in at least one case.
+_BINS = 60  # maximum number of bins
 
-    Parameters
-    ----------
-    name, unit, nominal
-        Name and unit of the figure, and its value in the bench itself.
-    figure
-        Its value in every case, shape (cases,); NaN if it is undefined.
-    confidence
-        Confidence of the intervals of its quantiles, between 0 and 1.
-    """
-    known = figure[np.isfinite(figure)]
-    return Spread(
-        name,
-        unit,
-        nominal,
-        figure.size - known.size,
-        float(known.mean()),
-        float(known.std(ddof=1)) if known.size > 1 else math.nan,
-        tuple(quantile(known, p, confidence) for p in QUANTILES),
-        float(known.min()),
-        float(known.max()),
-    )
+
+def bin_count(values: Array) -> int:
+    """Return the number of bins that shows the shape of values instead of their scatter."""
+    reach = np.ptp(values)
+    if not reach > 0.0:
+        return 1
+    # relative to their reach, since NumPy rejects values that differ only by rounding
+    edges = np.histogram_bin_edges((values - values.min()) / reach, bins="auto")
+    return int(np.clip(edges.size - 1, 1, _BINS))
+
+
+def bin_edges(least: float, largest: float, bins: int) -> Array:
+    """Return the edges of bins of the same width, as NumPy's histogram."""
+    beyond = 0.5 if least == largest else 0.0
+    return np.linspace(least - beyond, largest + beyond, bins + 1)
 
 
 # --- Probability of a missed requirement: estimate, interval, and source

@@ -1,7 +1,8 @@
-"""Folder of a study: a Parquet file per chunk, the identity of the study, and its size.
+"""Folder of a study: Parquet files of chunks, the identity of the study, and its size.
 
 A chunk depends only on the plan and its number, regardless of where and in which order it is
-computed.
+computed. Each finished chunk is a file. Once all chunks of a group are finished, a single file
+replaces theirs, so that the number of files of a large study stays small.
 """
 
 from __future__ import annotations
@@ -9,11 +10,13 @@ from __future__ import annotations
 import gc
 import json
 import math
+import os
+import re
 import shlex
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -23,6 +26,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, key_figures_of
+from bywire.bench.joined import in_groups
 from bywire.cases.store import PieceFolder
 from bywire.core.arguments import whole_number
 from bywire.core.brake import loaded_files
@@ -37,6 +41,9 @@ if TYPE_CHECKING:
 
 CASE, FAILURE, WARNINGS = "case", "failure", "warnings"
 """other columns than values and key figures: number, reason for a missing result, warnings"""
+
+CHOICE = "choice"
+"""entry of the record: the step that bywire chose for a stated error"""
 
 Columns = dict[str, NDArray[Any]]
 
@@ -134,22 +141,29 @@ def _computed(
     values: Mapping[str, NDArray[Any]],
     threads: int | None,
 ) -> Columns:
-    count = len(numbers)
-    benches: dict[int, Bench] = {}
-    failures = [""] * count
-    rows = zip(*(column.tolist() for column in values.values()), strict=True)
-    for k, (number, row) in enumerate(zip(numbers.tolist(), rows, strict=True)):
-        try:
-            benches[k] = case_bench(plan, number, dict(zip(values, row, strict=True)))
-        except BywireError as error:
-            failures[k] = str(error)
+    count, own = len(numbers), numbers.tolist()
+    rows = list(zip(*(column.tolist() for column in values.values()), strict=True))
+
+    def bench(k: int) -> Bench:
+        return case_bench(plan, own[k], dict(zip(values, rows[k], strict=True)))
+
     names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
     columns: Columns = {CASE: numbers, **values}
     columns |= {name: np.full(count, math.nan) for name in names}
     columns |= {name: np.full(count, "", dtype=object) for name in (FAILURE, WARNINGS)}
-    columns[FAILURE][:] = failures
-    for group in _alike(benches):
-        _fill(columns, group, benches, threads)
+    seeds = [_seed(plan, number) for number in own]
+    for places, joined in in_groups(plan.bench, values, seeds, bench):
+        if joined is not None:
+            _fill(columns, places.tolist(), joined, threads)
+            continue
+        benches: dict[int, Bench] = {}
+        for k in places.tolist():
+            try:
+                benches[k] = bench(k)
+            except BywireError as error:
+                columns[FAILURE][k] = str(error)
+        for group in _alike(benches):
+            _fill(columns, group, [benches[k] for k in group], threads)
     return columns
 
 
@@ -161,15 +175,14 @@ def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench
     InputError
         If the values contradict each other, or the experiment does not run with them.
     """
-    seed = plan.bench.seed + number if _is_noisy(plan, number) else None
-    return changed(plan.bench, values, seed)
+    return changed(plan.bench, values, _seed(plan, number))
 
 
-def _is_noisy(plan: StudyPlan, number: int) -> bool:
-    """Return whether a case has its own noise."""
-    if plan.sought is not None:
-        return plan.sought.has_own_noise(number // CHUNK)
-    return plan.is_sampled
+def _seed(plan: StudyPlan, number: int) -> int:
+    """Return the seed of a case, which differs if the case has its own noise."""
+    sought = plan.sought
+    is_noisy = plan.is_sampled if sought is None else sought.has_own_noise(number // CHUNK)
+    return plan.bench.seed + number if is_noisy else plan.bench.seed
 
 
 def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
@@ -182,11 +195,11 @@ def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
 
 
 def _fill(
-    columns: Columns, cases: Sequence[int], benches: Mapping[int, Bench], threads: int | None
+    columns: Columns, cases: Sequence[int], benches: Sequence[Bench], threads: int | None
 ) -> None:
     """Store results in the rows of their cases; if they fail together, rerun them separately."""
     try:
-        given = key_figures_of([benches[k] for k in cases], threads)
+        given = key_figures_of(benches, threads)
     except DeviceError:  # not caused by a case
         raise
     except BywireError as error:
@@ -194,8 +207,8 @@ def _fill(
             columns[FAILURE][cases[0]] = str(error)
             return
         middle = len(cases) // 2
-        _fill(columns, cases[:middle], benches, threads)
-        _fill(columns, cases[middle:], benches, threads)
+        _fill(columns, cases[:middle], benches[:middle], threads)
+        _fill(columns, cases[middle:], benches[middle:], threads)
         return
     for figure in given.figures:
         columns[figure.name][cases] = figure.values
@@ -259,8 +272,10 @@ def _write_chunk(
     parquet.write_table(table, path, write_page_checksum=True, use_dictionary=texts)
 
 
-def _read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
-    """Return the cases of a chunk's file, and the identity of the file.
+def _read_chunk(
+    path: Path, names: Sequence[str] | None = None
+) -> tuple[Columns, Mapping[bytes, bytes]]:
+    """Return the cases of a file, all columns or the named ones, and the identity of the file.
 
     Raises
     ------
@@ -270,7 +285,7 @@ def _read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
     parquet = library("pyarrow.parquet", *_WHAT)
     # Read a single file: the reader of folders needs three times as long, and loads more modules.
     with parquet.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file:
-        table = file.read(use_threads=False)
+        table = file.read(None if names is None else list(names), use_threads=False)
     columns = {
         name: np.asarray(table.column(name).to_numpy(zero_copy_only=False))
         for name in table.column_names
@@ -284,6 +299,11 @@ def _read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
 
 _CHUNKS = "chunks"
 """folder of the chunks"""
+GROUP = 1024
+"""number of consecutive chunks that a single file contains once all of them are finished"""
+_GROUP_FILE = "{:06d}-{:06d}.parquet"
+_GROUP_STEM = re.compile(r"(\d{6,})-(\d{6,})", re.ASCII)
+_MOST_KNOWN = 2 * GROUP  # chunks kept in memory, 16 kB each
 
 
 @dataclass(frozen=True)
@@ -329,6 +349,11 @@ class StudyStore(PieceFolder):
 
     # Cases that were read or written here, to avoid reading them again.
     _known: dict[int, Columns] = field(default_factory=dict, init=False, repr=False, compare=False)
+    # Numbers of the chunks with their own file, by group.
+    _single: dict[int, set[int]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+    _units: dict[str, str] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def elsewhere(self) -> str:
@@ -354,7 +379,10 @@ class StudyStore(PieceFolder):
             "set": dict(origin.overrides),
             "systems": list(loaded_files()),
         }
+        if plan.bench.choice is not None:
+            about[CHOICE] = asdict(plan.bench.choice)
         self.begin(plan, about)
+        self._units.update(plan.column_units)
 
     def asked_and_computed(self, plan: StudyPlan) -> tuple[int, int]:
         """Return the number of requested cases, and of computed cases.
@@ -392,22 +420,57 @@ class StudyStore(PieceFolder):
         words = ["bywire", "study", "resume", str(self.folder)]
         return shlex.join([*words, *(w for file in loaded_files() for w in ("--system", file))])
 
+    def listed(self) -> tuple[set[int], set[int]]:
+        """Return the numbers of chunks with their own file, and of groups with a single file."""
+        # Before the groups, since another process may merge files at this moment.
+        single, groups = super().finished(), set()
+        for path in (self.folder / _CHUNKS).glob("*-*.parquet"):
+            if match := _GROUP_STEM.fullmatch(path.stem):
+                first, last = map(int, match.groups())
+                if first % GROUP == 0 and last == first + GROUP - 1:
+                    groups.add(first // GROUP)
+        return single, groups
+
+    def finished(self) -> set[int]:
+        """Return the numbers of the stored chunks."""
+        single, groups = self.listed()
+        return single.union(*(_chunks_of(group) for group in groups))
+
+    def group_path(self, group: int) -> Path:
+        """Return the file of a group."""
+        chunks = _chunks_of(group)
+        return self.folder / _CHUNKS / _GROUP_FILE.format(chunks[0], chunks[-1])
+
     def drop_damaged(self) -> int:
-        """Remove files of unreadable chunks, so that they are recomputed.
+        """Remove unreadable files, so that their chunks are recomputed, and merge whole groups.
 
         Returns
         -------
         int
-            Number of removed files.
+            Number of chunks in the removed files.
         """
         _require_pyarrow()
         damaged = 0
-        for chunk in self.finished():
+        single, groups = self.listed()
+        for group in sorted(groups):
+            parts = single.intersection(_chunks_of(group))  # left by a killed process
+            try:
+                self.group(group)
+            except FileError:
+                self.group_path(group).unlink()
+                damaged += GROUP - len(parts)
+            else:
+                self._remove(parts)
+                single -= parts
+        self._single.clear()
+        for chunk in sorted(single):
             try:
                 self.columns(chunk)
             except FileError:
                 self.path(chunk).unlink()
                 damaged += 1
+            else:
+                self._add(chunk)
         return damaged
 
     def write(self, chunk: int, columns: Columns, units: Mapping[str, str]) -> None:
@@ -423,8 +486,18 @@ class StudyStore(PieceFolder):
             for name, column in columns.items()
         }
         marks = self._marks(chunk)
+        self._units.update(units)
         self.keep_file(chunk, lambda fresh: _write_chunk(fresh, columns, units, marks))
         self._known[chunk] = columns
+        self._add(chunk)
+
+    def _add(self, chunk: int) -> None:
+        """Count a chunk's file, and merge the files of its group if all of them exist."""
+        group = chunk // GROUP
+        there = self._single.setdefault(group, set())
+        there.add(chunk)
+        if len(there) == GROUP:
+            self._merge(group)
 
     def read(self, chunks: int) -> pd.DataFrame:
         """Return all cases of the first existing chunks, in order.
@@ -448,23 +521,49 @@ class StudyStore(PieceFolder):
         FileError
             If its file is damaged.
         """
-        if chunk not in self._known:
-            self._known[chunk] = self._read(chunk)
-        return self._known[chunk]
+        if chunk in self._known:
+            return self._known[chunk]
+        columns = self._read_single(chunk)
+        if len(self._known) < _MOST_KNOWN:
+            self._known[chunk] = columns
+        return columns
 
-    def _read(self, chunk: int) -> Columns:
-        """Return the content of a chunk's file; see `columns`."""
-        path = self.path(chunk)
+    def _read_single(self, chunk: int) -> Columns:
+        """Return the cases of a chunk from its own file, or from that of its group."""
+        try:
+            return self._read(self.path(chunk), self._marks(chunk))
+        except FileError:
+            # Another process may have just merged it.
+            if self.path(chunk).exists() or not self.group_path(chunk // GROUP).exists():
+                raise
+        columns = self.group(chunk // GROUP)
+        begin, end = np.searchsorted(columns[CASE], [chunk * CHUNK, (chunk + 1) * CHUNK])
+        return {name: column[begin:end].copy() for name, column in columns.items()}
+
+    def group(self, group: int, names: Sequence[str] | None = None) -> Columns:
+        """Return the cases of an existing group, all columns or the named ones.
+
+        Raises
+        ------
+        FileError
+            If its file is damaged.
+        """
+        return self._read(self.group_path(group), self._group_marks(group), names)
+
+    def _read(
+        self, path: Path, marks: Mapping[bytes, bytes], names: Sequence[str] | None = None
+    ) -> Columns:
+        """Return the content of a file with this identity; see `columns` and `group`."""
         _require_pyarrow()
         try:
-            columns, marks = _read_chunk(path)
+            columns, found = _read_chunk(path, names)
         except Exception as error:  # the library raises all kinds of exceptions for damaged files
             raise FileError(
                 f"{path} is damaged ({type(error).__name__}). To recompute it, type "
                 f"'{self.resume_command}'",
                 name=str(path),
             ) from None
-        if any(marks.get(key) != value for key, value in self._marks(chunk).items()):
+        if any(found.get(key) != value for key, value in marks.items()):
             raise FileError(
                 f"{path} belongs to another study, or is another chunk of this study. To "
                 f"recompute it, type '{self.resume_command}'",
@@ -472,13 +571,48 @@ class StudyStore(PieceFolder):
             )
         return columns
 
+    def _merge(self, group: int) -> None:
+        """Replace the files of a group's chunks with a single one, which is complete before."""
+        chunks = _chunks_of(group)
+        try:
+            each = [self.columns(chunk) for chunk in chunks]
+        except FileError:  # the next command that computes cases finds and recomputes it
+            return
+        columns = {name: np.concatenate([one[name] for one in each]) for name in each[0]}
+        marks = self._group_marks(group)
+
+        def write(fresh: Path) -> None:
+            _write_chunk(fresh, columns, self._units, marks)
+            with fresh.open("rb+") as file:  # before its parts are removed, even in a power cut
+                os.fsync(file.fileno())
+
+        self.keep_at(self.group_path(group), write)
+        self._remove(chunks)
+
+    def _remove(self, chunks: Iterable[int]) -> None:
+        """Remove the files of chunks that are in the file of their group."""
+        for chunk in chunks:
+            self.path(chunk).unlink(missing_ok=True)
+            self._known.pop(chunk, None)
+            self._single.pop(chunk // GROUP, None)
+
     def _marks(self, chunk: int) -> dict[bytes, bytes]:
         """Return the identity of a chunk's file."""
         return {b"study": self._digest, b"chunk": str(chunk).encode()}
 
+    def _group_marks(self, group: int) -> dict[bytes, bytes]:
+        """Return the identity of a group's file."""
+        chunks = _chunks_of(group)
+        return {b"study": self._digest, b"chunks": f"{chunks[0]}-{chunks[-1]}".encode()}
+
     @cached_property
     def _digest(self) -> bytes:
         return str(self.record()["digest"]).encode()
+
+
+def _chunks_of(group: int) -> range:
+    """Return the numbers of the chunks in a group."""
+    return range(group * GROUP, (group + 1) * GROUP)
 
 
 # --- Requested number of cases, in addition to the file and the folder

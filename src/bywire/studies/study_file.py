@@ -371,4 +371,5 @@ def read_bench(
                 valid="a string with its unit",
             )
     there = source if names_experiment(source) else folder / source
-    return bench_file.read(there, {**flat, **overrides})
+    kept = bench_file.without_replaced(flat, overrides, "simulation.")
+    return bench_file.read(there, {**kept, **overrides})

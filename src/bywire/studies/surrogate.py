@@ -177,9 +177,12 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
     require_fittable(plan)
     if kpi not in findings.units:
         raise unknown_name("key figure", kpi, findings.units)
-    y = findings.figure(kpi)
+    cases = findings.first
+    y = np.asarray(cases[kpi], dtype=float) if len(cases) else np.empty(0)
     known = np.isfinite(y)
-    columns = {v.name: np.asarray(findings.cases[v.name], dtype=float) for v in plan.varied}
+    columns = {
+        v.name: np.asarray(cases[v.name] if len(cases) else (), dtype=float) for v in plan.varied
+    }
     x, y = np.column_stack(list(columns.values()))[known], y[known]
     if y.size < _FEWEST:
         raise ParameterError(

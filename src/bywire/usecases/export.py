@@ -191,6 +191,7 @@ def export_fmu(
     """
     from bywire.api.exports import ExportedFmu, export_folder
     from bywire.api.run import bench_of
+    from bywire.bench.step_choice import with_chosen_step
     from bywire.core.errors import ParameterError, quoted, unknown_name
     from bywire.core.typing import silent
     from bywire.export.exported import KINDS, PARTS, exported
@@ -215,7 +216,8 @@ def export_fmu(
     for each in systems:
         if each not in PLATFORMS:
             raise unknown_name("target", each, PLATFORMS)
-    unit = unit_of(exported(bench_of(bench, overrides), case), part, fmi, kind)
+    bench = with_chosen_step(bench_of(bench, overrides), progress=progress)
+    unit = unit_of(exported(bench, case), part, fmi, kind)
     with export_folder(out) as folder:
         path = folder / f"{unit.identifier}.fmu"
         compilers = write_unit(unit, path, systems, progress or silent)
@@ -263,11 +265,12 @@ def export_wasm(
 
     from bywire.api.exports import ExportedWasm, export_folder
     from bywire.api.run import bench_of
+    from bywire.bench.step_choice import with_chosen_step
     from bywire.core.scratch import scratch_folder
     from bywire.export.exported import exported, identifier_of
     from bywire.export.wasm.module import module_files
 
-    bench = bench_of(bench, overrides)
+    bench = with_chosen_step(bench_of(bench, overrides))
     made = exported(bench, case)
     contents = module_files(made, identifier_of(bench.name or bench.experiment))
     with export_folder(out) as folder, scratch_folder(folder) as scratch:  # all, or none
@@ -339,6 +342,7 @@ def page(
     from bywire.api.exports import BenchPage
     from bywire.api.run import bench_of
     from bywire.bench.running import run
+    from bywire.bench.step_choice import with_chosen_step
     from bywire.core.errors import ParameterError, unknown_name
     from bywire.core.parameters import leaf_fields
     from bywire.export.exported import exported, interface, start_source
@@ -348,7 +352,7 @@ def page(
 
     if Path(out).suffix.lower() not in (".html", ".htm"):
         raise not_valid("out", repr(str(out)), "a file name that ends in .html")
-    bench = bench_of(bench, overrides)
+    bench = with_chosen_step(bench_of(bench, overrides))
     made = exported(bench, case)
     _, reads = start_source(made)
     used = [each.name for each in interface(made, "brake", reads).of("parameter")]

@@ -85,7 +85,7 @@ def project_life(
     from bywire.life.projection import one_by_one, projected
 
     shown = progress or silent
-    plan = _read(source, overrides, check)
+    plan = _read(source, overrides, check).with_step(progress)
     made = projected(plan, shown)
     rounds = min(check, made.stops) // plan.count
     return LifeResult(made, one_by_one(plan, rounds * plan.count, shown) if rounds else {})

@@ -84,7 +84,7 @@ def run_faults(
     from bywire.campaigns.running import CampaignStore, run_campaign
     from bywire.core.typing import silent
 
-    plan = _read(campaign, overrides)
+    plan = _read(campaign, overrides).with_step(progress)
     store = None if out is None else CampaignStore(Path(out))
     try:
         findings = run_campaign(plan, store, progress or silent)

@@ -124,13 +124,15 @@ def run_study(
     """
     from bywire.api.study_run import completed, with_engine
     from bywire.studies.meant_study import require_study_file
+    from bywire.studies.stated_error import with_step
     from bywire.studies.store import Origin, StudyStore, with_cases
     from bywire.studies.study_file import read_study
 
     source = Path(study)
     require_study_file(source)
     store = StudyStore(Path(out) if out is not None else Path(source.stem))
-    plan = with_cases(with_engine(engine, read_study(source, overrides)), store, cases)
+    plan = with_step(with_engine(engine, read_study(source, overrides)), store, progress)
+    plan = with_cases(plan, store, cases)
     return completed(Origin(source, overrides), plan, store, workers, cluster, progress)
 
 

@@ -8,10 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import getitem
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from numpy.lib.stride_tricks import sliding_window_view
 from pydantic import Field
 
@@ -25,6 +24,9 @@ from bywire.plant.road import Gradient, SurfaceName
 from bywire.vehicle import regeneration
 from bywire.vehicle.ideal_stop import RidingSpeed, ideal_recovery
 from bywire.vehicle.surfaces import laid
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 TorqueDemand = Annotated[float, Unit("N*m", 300.0), Field(gt=0, allow_inf_nan=False)]
 CoastTorque = Annotated[float, Unit("N*m", 50.0), Field(ge=0, allow_inf_nan=False)]

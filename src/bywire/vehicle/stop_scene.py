@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.typing import Array
 from bywire.plant import road
@@ -16,6 +16,9 @@ from bywire.report import style
 from bywire.report.animation.scene import Dial, Move, Scene, frames_of, over_frames
 from bywire.report.channel import phases
 from bywire.vehicle.surfaces import surface_name
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SCALE = 100.0
 """drawing units per meter"""

@@ -10,7 +10,6 @@ from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from bywire.analysis.linear.corners import Jacobians, Linearization, linear_models, magnitudes
 from bywire.analysis.linear.linear_model import LinearModel
@@ -252,7 +251,7 @@ def _stiffness(
     """Return the stiffness of the contacts that are closed at a state, zero for open ones."""
     values = functions.contacts(list(state), p)
     *matrices, gaps = map(np.array, values if isinstance(values, tuple) else (values,))
-    blocks, at = [], 0
+    whole, at = np.zeros((sum(map(len, matrices)),) * 2), 0
     for C in matrices:
         d = gaps[at : at + len(C), 0]
         left, slack, K = _active(C, d)
@@ -262,9 +261,9 @@ def _stiffness(
                 "operating point. Choose a point at which it is clearly open or closed",
                 name="contact",
             )
-        blocks.append(K)
+        whole[at : at + len(C), at : at + len(C)] = K
         at += len(C)
-    return block_diag(*blocks) if blocks else np.zeros((0, 0))
+    return whole
 
 
 def closed_contacts(model: Model, par: ParameterSet, state: NamedTuple) -> list[int]:

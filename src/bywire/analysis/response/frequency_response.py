@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
@@ -31,6 +30,9 @@ from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex, Progress
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 HARMONICS = 9
 """highest harmonic that is treated as distortion"""

@@ -19,7 +19,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.analysis.crossings import (
     fall,
@@ -180,6 +179,8 @@ def narrowest(response: xr.Dataset, amplitude: int) -> int:
 
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from bywire.analysis.loop import Loop
     from bywire.core.parameters import ParameterSet
 

@@ -6,10 +6,9 @@ contact forces from its overlaps.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Experiment, Recordings
@@ -21,6 +20,10 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
+from bywire.data.labeled import labeled
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Speed = Annotated[float, Unit("friction"), Field(gt=0, allow_inf_nan=False)]
 Levels = Annotated[
@@ -78,14 +81,11 @@ def build(tested: TestedModel) -> Experiment:
         dims = (f"{along}_level" if along == velocity else along, velocity)
         labels = (states[along].label, states[velocity].label)
         axes = (np.array(options.levels), speeds)
-        coords = {
-            dim: (dim, axis, {"units": states[name].unit, "long_name": label})
+        places = {
+            dim: (axis, states[name].unit, label)
             for dim, name, axis, label in zip(dims, (along, velocity), axes, labels, strict=True)
         }
-        curve = xr.Dataset(
-            {"friction": (dims, values, {"units": force, "long_name": "dry friction"})}, coords
-        )
-        return {"curve": curve}
+        return {"curve": labeled(places, {"friction": (values, force, "dry friction")})}
 
     def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
         """Return the breakaway friction in both directions, and the minimum friction in motion."""

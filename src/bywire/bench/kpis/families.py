@@ -6,18 +6,20 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType, ModuleType
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases, Measure
-from bywire.bench.kpis.loop_family import LoopFamily
+from bywire.bench.kpis.loop_family import FiguresInC, LoopFamily
 from bywire.bench.kpis.samples import signal
 from bywire.bench.recording import Rows
-from bywire.core.errors import ModelError
+from bywire.core.errors import CompilerError, ModelError
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -218,7 +220,7 @@ class FamilyJudge:
         each = [known[id(chosen)] for chosen in options]
         own: Iterable[KpiOfCases] = ()
         if self.levels is not None or self.further is not None:
-            runs = [cast(xr.Dataset, rows.case(k, par=par)) for k, par in enumerate(pars)]
+            runs = [cast("xr.Dataset", rows.case(k, par=par)) for k, par in enumerate(pars)]
             each = list(map(self._of_run, each, runs, options))
             if self.further is not None:
                 own = of_cases(list(map(self.further, runs, options)))
@@ -277,7 +279,7 @@ def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, 
         if together is not None:
             return together
     each = [
-        evaluate(name, cast(xr.Dataset, rows.case(k)), setting).values()
+        evaluate(name, cast("xr.Dataset", rows.case(k)), setting).values()
         for k, setting in enumerate(settings)
     ]
     return {figure.name: figure for figure in of_cases(each)}
@@ -301,8 +303,12 @@ def _in_c(family: LoopFamily, rows: Rows, settings: Sequence[Any]) -> dict[str, 
         getattr(each, name) != getattr(first, name) for each in distinct for name in family.signals
     ):
         return None
-    signals, level = family.signals_of(cast(xr.Dataset, rows), first)
-    made = family.in_c(rows["time"].values, list(signals.values()), settings)
+    on_device = _on_device(family, rows, settings)
+    if on_device is None:
+        signals, level = family.signals_of(cast("xr.Dataset", rows), first)
+        made = family.in_c(rows["time"].values, list(signals.values()), settings)
+    else:
+        made, level = on_device
 
     left_open = [place for place, each in enumerate(family.reasons, 1) if each.is_open]
 
@@ -323,3 +329,28 @@ def _in_c(family: LoopFamily, rows: Rows, settings: Sequence[Any]) -> dict[str, 
         )
         for place, (name, figure) in enumerate(family.measures.items())
     }
+
+
+def _on_device(
+    family: LoopFamily, rows: Rows, settings: Sequence[Any]
+) -> tuple[FiguresInC, str] | None:
+    """Return the figures of cases whose rows a graphics processor holds, and the level's unit.
+
+    None for other rows, and if a signal that the family needs is missing.
+    """
+    if rows.held is None or not family.is_on_device:
+        return None
+    wanted = {name: getattr(settings[0], name) for name in family.signals}
+    names = [each if each in rows.held.names else None for each in wanted.values()]
+    if any(
+        name is None and not is_optional
+        for name, is_optional in zip(names, family.signals.values(), strict=True)
+    ):
+        return None
+    first = names[0] if names else None
+    level = "1" if first is None else rows.unit(first)
+    try:
+        return family.on_device(rows["time"].values, rows.held, names, settings), level
+    except CompilerError:  # this machine's processor computes the same figures
+        family.is_on_device = False
+        return None

@@ -14,15 +14,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.kpis.kpi import Undefined, measure
 from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
 from bywire.core.quantities import readable_unit
 from bywire.core.typing import Array
 from bywire.core.units import shown
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _OPEN = 0.05  # of the drive's range: maximum distance between both ends of a closed loop
 _LEFT = 0.01  # of the response's range: minimum residual at the end that a note mentions

@@ -23,7 +23,8 @@ from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
 from bywire.core.undefined import EqualWhereUndefined
 
-_BOUND = 3.0  # factor for errors without convergence: contains 95 % of the true errors
+BOUND = 3.0
+"""factor for errors without convergence: contains 95 % of the true errors"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ class Kpi(EqualWhereUndefined):
     @property
     def bound(self) -> float:
         """Bound of the numerical error in ``unit``: three times the error without convergence."""
-        return self.error if self.converges else _BOUND * self.error
+        return self.error if self.converges else BOUND * self.error
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,9 @@ from dataclasses import fields, replace
 from functools import cache, cached_property
 from pathlib import Path
 from types import FunctionType, ModuleType, NoneType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi, Measure, Undefined
@@ -47,6 +46,13 @@ from bywire.bench.kpis.translator import (
 from bywire.core.errors import CompilerError, ModelError
 from bywire.core.typing import Array
 from bywire.simulation.compiler import find_compiler, load_library
+from bywire.simulation.cuda import THREADS
+
+if TYPE_CHECKING:
+    from bywire.bench.recording import Held
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 NO_NUMBER = "its value is not a finite number"
 _NO_FIGURE = Undefined(NO_NUMBER)
@@ -55,6 +61,12 @@ _FEW = 100_000  # rows: Python evaluates this many in a third of the compilation
 _NEGATIVE_ZERO = re.compile(r"-0(?![.\d])")
 _HEADER = Path(__file__).with_name("loops.h")
 _PACKED = (FLOAT, INT, BOOL, PAIR)
+_ARGUMENTS = """const double *times, const bw_signal *signals,
+    const double *settings, double *work, double *values, int32_t *reasons, double *numbers"""
+# C++ has no literals of structures with their type in parentheses.
+_LITERAL = re.compile(r"\((bw_\w+)\)(?=\{)")
+_INCLUDE = re.compile(r"^#include.*$", re.M)
+_SHARE = 4  # part of the device's free memory for the work arrays of its threads
 
 
 class Reason(NamedTuple):
@@ -97,6 +109,7 @@ class LoopFamily:
         self.shared: dict[str, FunctionType] = {}  # in an order in which each follows its arguments
         self._module = module
         self._looked_at = 0  # rows of single runs
+        self.is_on_device = True  # unless the compiler rejects it
         self._optional: dict[str, bool] = {}  # signals, and whether they may be missing
         for each in self.measures.values():
             self._take(each.__wrapped__)
@@ -205,17 +218,31 @@ class LoopFamily:
         ModelError
             When a function cannot be translated.
         """
+        return self._text(f"""void {self.entry}(int64_t cases, int64_t n, {_ARGUMENTS}) {{""")
+
+    @cached_property
+    def cuda_text(self) -> str:
+        """The family's CUDA C, with a kernel that has one thread for each case."""
+        head = f"""KERNEL void __launch_bounds__({THREADS}) {self.entry}(const int64_t *sizes,
+    {_ARGUMENTS}) {{
+  const int64_t cases = sizes[0], n = sizes[1], first = sizes[2];
+  const int64_t begin = first + (int64_t)blockIdx.x * blockDim.x + threadIdx.x;
+  const int64_t end = begin < sizes[3] ? begin + 1 : begin;"""
+        text = self._text(head, "begin", "end", f"work + (k - first) * n * {self.room}")
+        return _LITERAL.sub(r"LITERAL(\1)", _INCLUDE.sub("", text))
+
+    def _text(self, head: str, begin: str = "0", end: str = "cases", work: str = "work") -> str:
+        """Return all functions, and one with a head that judges the cases from begin to end."""
         unit = self._unit
         lines = "\n".join(f"    {line}" for line in self._lines())
         return f"""{_HEADER.read_text(encoding="utf-8")}
 {unit.text}
-void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal *signals,
-    const double *settings, double *work, double *values, int32_t *reasons, double *numbers) {{
+{head}
   const bw_figures to = {{values, reasons, numbers, cases}};
   const bw_samples t = {{times, n}};
   const bw_undefined of_times = {unit.function(defect_of_times).name}(t);
-  for (int64_t k = 0; k < cases; ++k) {{
-    double *rest = work, **room = &rest;
+  for (int64_t k = {begin}; k < {end}; ++k) {{
+    double *rest = {work}, **room = &rest;
     bw_undefined wrong = of_times;
 {lines}
   }}
@@ -371,31 +398,64 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         settings
             Setting of each case.
         """
-        cases, n = len(settings), t.size
         kept = [None if each is None else _in_rows(each) for each in signals]
-        places = np.array(
-            [(0, 0) if y is None else (y.ctypes.data, y.strides[0] // 8) for y in kept] or [(0, 0)],
-            dtype=np.int64,
-        )
+        places = [(0, 0) if y is None else (y.ctypes.data, y.strides[0] // 8) for y in kept]
+        given, made = self._arrays(t, places, settings)
+        work = np.empty(max(1, self.room * t.size))
+        arrays = (*given, work, *made)
+        self._function(len(settings), t.size, *(each.ctypes.data for each in arrays))
+        made.values[:] += 0.0  # zeros are positive: C does not preserve their sign
+        return made
+
+    def on_device(
+        self, t: Array, held: Held, signals: Sequence[str | None], settings: Sequence[Any]
+    ) -> FiguresInC:
+        """Return the figures of many cases whose rows a graphics processor holds; see `in_c`.
+
+        ``signals``: names of the signals in the order of ``self.signals``; None for a missing one.
+        """
+        cases, n, device = len(settings), t.size, held.rows.device
+        places = [(0, 0) if each is None else (held.address(each), n) for each in signals]
+        given, made = self._arrays(t, places, settings)
+        figures: tuple[NDArray[Any], ...] = made
+        function = device.load(self.cuda_text, self.entry)
+        with device.working() as memory:
+            there = [memory.room(each.nbytes) for each in given]
+            results = [memory.room(each.nbytes) for each in figures]
+            sizes = memory.room(32)
+            for place, each in zip(there, given, strict=True):
+                memory.put(place, each)
+            size = max(8 * self.room * n, 8)
+            together = min(cases, max(device.free() // (_SHARE * size), 1))
+            work = memory.room(together * size)
+            for first in range(0, cases, together):
+                end = min(first + together, cases)
+                memory.put(sizes, np.array([cases, n, first, end]))
+                arguments = (sizes, *there, work, *results)
+                memory.run(function, -(-(end - first) // THREADS), THREADS, arguments)
+            for place, each in zip(results, figures, strict=True):
+                memory.get(place, each)
+        made.values[:] += 0.0
+        return made
+
+    def _arrays(
+        self, t: Array, places: Sequence[tuple[int, int]], settings: Sequence[Any]
+    ) -> tuple[tuple[NDArray[Any], ...], FiguresInC]:
+        """Return the arguments of the function in C before its work array, and its results.
+
+        ``places``: address and distance of the cases of each signal; zero for a missing one.
+        """
         distinct = {id(each): each for each in settings}  # mostly one
         rows = {number: self.packed(each) for number, each in distinct.items()}
         packed = np.array([rows[id(each)] for each in settings], dtype=np.float64).reshape(-1)
-        work = np.empty(max(1, self.room * n))
-        values = np.empty((len(self.measures), cases))
-        reasons = np.empty(values.shape, dtype=np.int32)
-        numbers = np.empty((*values.shape, 3))
-        arrays = (
+        shape = len(self.measures), len(settings)
+        given = (
             np.ascontiguousarray(t, dtype=np.float64),
-            places,
+            np.array(places or [(0, 0)], dtype=np.int64),
             packed,
-            work,
-            values,
-            reasons,
-            numbers,
         )
-        self._function(cases, n, *(each.ctypes.data for each in arrays))
-        values += 0.0  # zeros are positive: C does not preserve their sign
-        return FiguresInC(values, reasons, numbers)
+        reasons, numbers = np.empty(shape, dtype=np.int32), np.empty((*shape, 3))
+        return given, FiguresInC(np.empty(shape), reasons, numbers)
 
     def undefined(self, reason: int, numbers: Sequence[float]) -> Undefined:
         """Return an `Undefined` for a number of a reason in C."""

@@ -10,15 +10,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Undefined, measure
 from bywire.bench.kpis.samples import defect, signal
 from bywire.core.typing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _HALF_POWER = math.sqrt(0.5)
 _ROUNDED = 1e-12  # of the output's maximum magnitude: smaller motion is rounding error

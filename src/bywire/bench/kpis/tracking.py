@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.kpis.kpi import Undefined, measure
 from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
 from bywire.core.typing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _LONGEST_LAG = 0.3  # s: upper limit of the search
 _STILL = 0.05  # of the set point's range: minimum motion of a signal that follows

@@ -54,7 +54,10 @@ _MOST_NUMBERS = 3
 """maximum number of numbers in the text of an undefined figure, as in `bw_undefined` of loops.h"""
 _C_WORDS = (
     "auto case char const default do double enum extern float goto inline int long register "
-    "restrict short signed sizeof static struct switch typedef union unsigned void volatile"
+    "restrict short signed sizeof static struct switch typedef union unsigned void volatile "
+    # also in C++, for graphics processors
+    "catch concept delete explicit export friend mutable namespace new operator private protected "
+    "public requires template this throw typename using virtual"
 )
 
 

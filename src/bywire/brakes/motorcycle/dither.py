@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.analysis.loop import Point
 from bywire.analysis.periodic import PeriodicModel, periodic_model, require_moving
@@ -31,6 +31,9 @@ from bywire.plant import seal_friction
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
 from bywire.synthesis.study import Cut, variable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Par = MotorcycleParameters
 
@@ -524,6 +527,8 @@ def mapped(
             "ratio of motor current to dither, stuck shaft",
         ),
     }
+    import xarray as xr  # slow to load
+
     return xr.Dataset(columns).assign_coords(
         pressure=variable(list(grid.pressures), ("pressure",), "Pa", "pressure"),
         gain=variable(gains, ("gain",), "1", "dither gain"),

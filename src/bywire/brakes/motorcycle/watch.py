@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.parameters import ParameterSet
+from bywire.core.validity import outline
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 WATCHED = ("at_stop", "F_stop", "i", "p_pd")
 
@@ -28,7 +31,7 @@ def cases_at_stops(rows: Any) -> list[int]:
     """Return the cases with a warning about a stop; ``rows``: signals of shape (cases, rows)."""
     if "F_stop" not in rows:
         return []
-    force = rows["F_stop"].values
+    force = outline(rows, "F_stop")
     return np.flatnonzero((force > 0).any(axis=-1) | (force[..., -1] < 0)).tolist()
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from bywire.brakes.two_wheeler.case import vehicle_of
 from bywire.report import style
 from bywire.report.animation.scene import Scene, SceneKind
 from bywire.vehicle.stop_scene import SCALE, Wheel, stop_scene
 from bywire.vehicle.two_wheeler import VehicleParameters
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _DIALS = (
     ("v", "vehicle speed", "km/h", 3.6, 120.0, style.BLUE),

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case
@@ -22,6 +21,9 @@ from bywire.plant.road import SurfaceName
 from bywire.vehicle import ideal_stop
 from bywire.vehicle.surfaces import laid
 from bywire.vehicle.two_wheeler import VehicleParameters
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Course = Callable[[Array], Array]
 Vehicle = tuple[type[Any], Callable[..., tuple[Any, Any]]]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -19,6 +19,9 @@ from bywire.vehicle.ideal_stop import ideal_distance
 from bywire.vehicle.stop_scene import TINTS
 from bywire.vehicle.surfaces import surface_name
 from bywire.vehicle.two_wheeler import VehicleParameters
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _STROKES: dict[str, tuple[str, style.Dash]] = {
     "v": (style.BLUE, "-"),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCornerParameters
 from bywire.report import style
 from bywire.report.animation.scene import Scene, SceneKind
 from bywire.vehicle.stop_scene import SCALE, Wheel, stop_scene
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _DIALS = (
     ("v_x", "vehicle speed", "km/h", 3.6, 120.0, style.BLUE),

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from pydantic import AfterValidator, Field
 
 from bywire.bench.experiment import Case
@@ -23,6 +22,9 @@ from bywire.core.quantities import Unit
 from bywire.core.signals import zeros
 from bywire.core.typing import Array
 from bywire.plant import roller_screw
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Signals = Mapping[str, Array]
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.brakes.wedge.elements import wedge
@@ -12,6 +13,9 @@ from bywire.core.errors import not_valid
 from bywire.core.typing import Array
 from bywire.data.recursive_filter import filtered
 from bywire.identification.tracking import Relation, Rows
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _PRESSED = 0.1  # fraction of the maximum force below which the relation is imprecise
 _STEADY = 0.02  # maximum change per sensor time constant, relative to the maximum force

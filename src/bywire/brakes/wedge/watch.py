@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.brakes.wedge.laws.moment_control import MOMENT
 from bywire.core.parameters import ParameterSet
 from bywire.core.units import shown
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Rows = NDArray[np.bool_]
 

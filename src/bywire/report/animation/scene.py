@@ -8,14 +8,16 @@ from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array
 from bywire.report.inline_script import admitted
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Frames = Array | float
 

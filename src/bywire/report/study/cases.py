@@ -12,6 +12,7 @@ from matplotlib.axis import Axis
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from bywire.core.typing import Array
 from bywire.report import style
@@ -43,16 +44,30 @@ class CaseAxis:
     name, unit
         Label, and SI unit, or ``"%"``.
     values
-        Value of each case, shape (cases,), NaN where there is none; for choices the index of each
-        case's choice.
+        Value of each drawn case, shape (cases,), NaN where there is none; for choices the index of
+        each case's choice.
     choices
         Names of the choices, in order; empty for numbers.
+    ends
+        Least and largest value of all cases. Default: of the drawn cases.
+    rows
+        Row of each drawn case among all cases. Default: all cases are drawn.
     """
 
     name: str
     unit: str
     values: Array
     choices: tuple[str, ...] = ()
+    ends: tuple[float, float] | None = None
+    rows: NDArray[np.intp] | None = None
+
+    @property
+    def extremes(self) -> Array:
+        """Least and largest value of all cases; empty if there are none."""
+        if self.ends is not None:
+            return np.array(self.ends)
+        known = self.values[np.isfinite(self.values)]
+        return np.array([known.min(), known.max()]) if known.size else np.empty(0)
 
     @property
     def label(self) -> str:
@@ -62,7 +77,7 @@ class CaseAxis:
     @property
     def scale(self) -> Scale:
         """Scale of the values."""
-        return Scale(1.0, "") if self.choices else scale_of(self.values, self.unit)
+        return Scale(1.0, "") if self.choices else scale_of(self.extremes, self.unit)
 
     @property
     def shown(self) -> Array:
@@ -74,7 +89,8 @@ class CaseAxis:
         """Values of the points; those of a choice are spread, always in the same way."""
         if not self.choices:
             return self.shown
-        places = np.arange(self.values.size) * _GOLDEN % 1.0
+        rows = np.arange(self.values.size) if self.rows is None else self.rows
+        places = rows * _GOLDEN % 1.0
         return self.values + _JITTER * (2.0 * places - 1.0)
 
     @property
@@ -99,7 +115,12 @@ class CaseAxis:
                 label.set(rotation=30, ha="right", rotation_mode="anchor")
 
 
-def choice_axis(name: str, values: Sequence[str], choices: Sequence[str]) -> CaseAxis:
+def choice_axis(
+    name: str,
+    values: Sequence[str],
+    choices: Sequence[str],
+    rows: NDArray[np.intp] | None = None,
+) -> CaseAxis:
     """Return the axis of a structural choice.
 
     Parameters
@@ -110,9 +131,12 @@ def choice_axis(name: str, values: Sequence[str], choices: Sequence[str]) -> Cas
         The choice of each case.
     choices
         All choices, in order.
+    rows
+        See `CaseAxis`.
     """
     places = {choice: k for k, choice in enumerate(choices)}
-    return CaseAxis(name, "", np.array([places[each] for each in values], float), tuple(choices))
+    values_at = np.array([places[each] for each in values], float)
+    return CaseAxis(name, "", values_at, tuple(choices), rows=rows)
 
 
 # --- A key figure versus the quantities that drive it
@@ -142,7 +166,7 @@ def scatter(
     values, scale = figure_of.shown, figure_of.scale
     good, bad = cases.met, cases.missed
     many, many_bad = good.size + bad.size > _MANY_POINTS, bad.size > _MANY_POINTS
-    far = beyond(scale(limit), values[np.isfinite(values)])
+    far = beyond(scale(limit), scale(figure_of.extremes))
     for axes, driver in zip(panels, drivers, strict=True):
         style.dress(axes)
         axes.plot(
@@ -178,6 +202,7 @@ def scatter(
                 clip_on=False,
                 alpha=0.6,
                 transform=axes.get_xaxis_transform(),
+                rasterized=cases.lacking.size > _MANY_POINTS,
             )
         if not far:
             axes.axhline(
@@ -192,7 +217,7 @@ def scatter(
     if far:
         low, high = first.get_ylim()
         room = 0.15 * (high - low)  # space for the text, beside the points
-        text = limit_text(limit, figure_of.unit, size_of(figure_of.values))
+        text = limit_text(limit, figure_of.unit, size_of(figure_of.extremes))
         first.set_ylim(low - (far < 0) * room, high + (far > 0) * room)
         first.text(
             0.02,
@@ -261,9 +286,9 @@ def parallel_coordinates(
         Limits of key figures, in their unit: a mark on the axis, or at its end if no case reaches
         the limit.
     """
-    axes_of = [each for each in axes_of if np.isfinite(each.values).any()]
+    axes_of = [each for each in axes_of if each.extremes.size]
     figure, (axes,) = style.new_figure(3.4)
-    ends = [(float(np.nanmin(a.shown)), float(np.nanmax(a.shown))) for a in axes_of]
+    ends = [(float(low), float(high)) for a in axes_of for low, high in [a.scale(a.extremes)]]
     scaled = np.array(
         [
             (a.shown - low) / (high - low or 1.0)

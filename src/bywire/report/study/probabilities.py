@@ -11,12 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
+from numpy.typing import NDArray
 
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.channel import size_of
 from bywire.report.panels import Role
 from bywire.report.readable_axis import (
+    Scale,
     beyond,
     few_labels,
     limit_text,
@@ -30,17 +32,20 @@ from bywire.studies.statistics import Share
 _COLUMNS = 2
 _HEIGHT = 1.5  # height of a panel [inch]
 _ROOM = 2.7  # width of a panel [inch]
-_BINS = 60  # maximum number of bins
 
 
 @dataclass(frozen=True)
-class Spread:
-    """A key figure's values in all cases.
+class Histogram:
+    """Histogram of a key figure's values in all cases, in ``unit``.
 
     Parameters
     ----------
-    values
-        In ``unit``, shape (cases,); NaN where it is not defined.
+    counts, edges
+        Number of cases in each bin, and the edges of the bins.
+    ends
+        Least and largest value.
+    band
+        Ends of the band that contains 90 % of the cases.
     unit
         SI unit, or ``"%"``.
     nominal
@@ -49,13 +54,16 @@ class Spread:
         Required limit; None for none.
     """
 
-    values: Array
+    counts: NDArray[np.int64]
+    edges: Array
+    ends: tuple[float, float]
+    band: tuple[float, float]
     unit: str
     nominal: float
     limit: float | None = None
 
 
-def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
+def histograms(spreads: Mapping[str, Histogram], has_band: bool = True) -> Figure:
     """Draw a histogram of every key figure, by name, each in its own panel.
 
     The dashed line is the bench itself, the dotted line the limit.
@@ -76,16 +84,16 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
     has_limit = False
     for axes, (name, spread) in zip(grid.flat, spreads.items(), strict=False):
         style.dress(axes)
-        scale = scale_of(spread.values, spread.unit)
-        values = scale(spread.values[np.isfinite(spread.values)])
-        _draw_counts(axes, values)
+        ends = np.array(spread.ends)
+        scale = scale_of(ends, spread.unit)
+        _draw_counts(axes, spread.counts, _scaled(scale, spread))
         if has_band:
-            axes.axvspan(*np.quantile(values, (0.05, 0.95)), color=style.SHADE, zorder=0)
+            axes.axvspan(*scale(np.array(spread.band)), color=style.SHADE, zorder=0)
         for at, look in ((spread.nominal, own), (spread.limit, bound)):
             if at is None or not np.isfinite(at):
                 continue
-            if look is bound and (far := beyond(scale(at), values)):
-                text = limit_text(at, spread.unit, size_of(spread.values))
+            if look is bound and (far := beyond(scale(at), scale(ends))):
+                text = limit_text(at, spread.unit, size_of(ends))
                 name_beyond(axes, text, far, look.color)
                 continue
             has_limit |= look is bound
@@ -109,13 +117,18 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
     return figure
 
 
-def _draw_counts(axes: Axes, values: Array) -> None:
+def _scaled(scale: Scale, spread: Histogram) -> Array:
+    """Return the edges of bins in the unit of the axis; a single value has a bin around it."""
+    least, largest = spread.ends
+    return scale(spread.edges) if largest > least else scale(least) + np.array([-0.5, 0.5])
+
+
+def _draw_counts(axes: Axes, counts: NDArray[np.int64], edges: Array) -> None:
     """Fill the outline of a histogram.
 
     A patch would make matplotlib search its limits like those of curves, which takes half as long
     as layout and drawing of the panel.
     """
-    counts, edges = np.histogram(values, _bins(values))
     heights = np.concatenate([[0.0], np.repeat(counts, 2), [0.0]])
     outline = np.column_stack([np.repeat(edges, 2), heights])
     area = Polygon(outline, facecolor=style.BLUE, alpha=0.75)
@@ -123,12 +136,6 @@ def _draw_counts(axes: Axes, values: Array) -> None:
     axes.add_artist(area)
     axes.update_datalim(outline)
     axes.autoscale_view()
-
-
-def _bins(values: Array) -> int:
-    """Return the number of bins that shows the shape of values instead of their scatter."""
-    edges = np.histogram_bin_edges(values, bins="auto") if np.ptp(values) > 0 else values[:2]
-    return int(np.clip(edges.size - 1, 1, _BINS))
 
 
 # --- Probability that a key figure is worse than a value, down to rare values

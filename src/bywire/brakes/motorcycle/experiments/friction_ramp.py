@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import hysteresis, occupation
@@ -17,6 +16,9 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, CurrentRate, Frequency, TimeConstant
 from bywire.data.recursive_filter import low_passed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 WITHOUT, WITH = "without-dither", "with-dither"
 

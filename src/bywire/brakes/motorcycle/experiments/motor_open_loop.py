@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -18,6 +17,9 @@ from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _SOURCES: dict[str, tuple[DriveMode, str, str]] = {
     "current": ("current-source", "i_set", "A"),

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case, Experiment
@@ -21,6 +20,9 @@ from bywire.core.quantities import TimeConstant
 from bywire.core.units import shown
 from bywire.data.measurement import read_trace, trace_names
 from bywire.plant import pedal
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, by preference
 # Built-in ride (our choice): pedal travel [mm] over time [s]. Three increasingly fast pulls, a
@@ -74,6 +76,7 @@ def judged(options: Options) -> dict[str, Any]:
 def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
     """Return the ride with a variable ``force`` [N], or ``pressure`` [Pa] if present."""
     if not options.trace:
+        import xarray as xr  # slow to load, like SciPy
         from scipy.interpolate import PchipInterpolator
 
         times = np.arange(0.0, _TIMES[-1], 1e-2)

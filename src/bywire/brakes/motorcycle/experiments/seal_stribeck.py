@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Experiment, Recordings
@@ -15,6 +14,9 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Nodes, Unit
 from bywire.data.labeled import labeled
 from bywire.plant import seal_friction
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FIGURES = Figures(
     breakaway_apply=("N*m", "Maximum friction torque while applying, at the highest pressure."),

@@ -6,10 +6,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -40,6 +39,9 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.simulation.run import Run, simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Curves of the braking dynamics: measured, modeled and theoretical magnitude, phase and step.
 

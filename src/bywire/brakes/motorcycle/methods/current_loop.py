@@ -6,10 +6,9 @@ neglects the converter's resolution and treats its quantization error as noise.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import as_run
@@ -20,6 +19,9 @@ from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at
 from bywire.core.quantities import Current, Pressure, Torque, Unit
 from bywire.identification.electrics import CurrentLoop, LoopOptions, levels
 from bywire.simulation.run import simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Options(LoopOptions):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import as_run
@@ -30,6 +29,9 @@ from bywire.identification.method import Effort, Identified, Method
 from bywire.identification.output_error import output_error
 from bywire.identification.unknown import parameters_of
 from bywire.simulation.run import simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _NAMES = ("motor.R_m", "motor.L_m", "motor.K_e")
 _TURNS = 1.0  # rad/s: a slower shaft is treated as locked

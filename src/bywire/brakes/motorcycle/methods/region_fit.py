@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.linear import two_pole
@@ -20,6 +20,9 @@ from bywire.identification.estimate import Estimate, Kept
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown, moved
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Complex = NDArray[np.complex128]
 

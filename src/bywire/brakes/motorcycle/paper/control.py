@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.crossings import bandwidth, fall
@@ -35,6 +34,7 @@ from bywire.reproduction.reproduction import Exhibit, Part, kpis
 from bywire.synthesis.bench_figures import bench_figures
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 LOCKED = {"seal.T_pr": 10.0}

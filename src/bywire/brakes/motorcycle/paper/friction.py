@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.response.sweep import amplitudes, total_distortion
@@ -28,6 +28,9 @@ from bywire.report.friction_figures import hysteresis_loop, stribeck_curve
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part, kpis, peak, selected
 from bywire.simulation.run import simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 P_EQ19 = 25e5
 """pressure at which eq. (19) is checked [Pa], as in Fig. 6"""

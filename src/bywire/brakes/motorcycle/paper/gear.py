@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from bywire.brakes.motorcycle.paper.runs import FRICTIONLESS, MAIN, SETS, Runs, parameters
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
@@ -12,6 +11,9 @@ from bywire.brakes.motorcycle.trim import holding_current
 from bywire.report.energy_balance import energy_balance
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part, selected
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 P_FROM = 37e5
 """pressure at which the release begins [Pa], as in Fig. 7a"""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import cast
-
-import xarray as xr
+from typing import TYPE_CHECKING, cast
 
 from bywire.analysis.loop import LOOPS, Point
 from bywire.analysis.response.frequency_response import frequency_response
@@ -19,6 +17,9 @@ from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.signals import zeros
 from bywire.reproduction import reproduction
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MAIN = "dardanelli2010"
 PRINTED = "dardanelli2010-table1"

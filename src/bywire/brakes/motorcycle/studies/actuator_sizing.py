@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field, model_validator
 
 from bywire.bench.experiment import Case, as_run
@@ -30,6 +29,9 @@ from bywire.plant import ball_screw_gear, brake_fluid, caliper, master_cylinder,
 from bywire.plant import seal_friction as seal
 from bywire.simulation.run import simulate
 from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, edge_warnings, require_ranges
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Par = MotorcycleParameters
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
@@ -15,6 +16,9 @@ from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _LEFT = 0.1  # fraction of the torque below which the brake is treated as released
 _END = 0.1  # s: averaging window at the end

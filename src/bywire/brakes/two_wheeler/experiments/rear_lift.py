@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
@@ -14,6 +14,9 @@ from bywire.brakes.two_wheeler.parameters import PressureRate, TwoWheelerParamet
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Factor
 from bywire.vehicle.ideal_stop import RidingSpeed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FIGURES = Figures(
     undefined="the rear wheel stays on the ground",

@@ -1,9 +1,8 @@
 """Repeated stops: brakes that warm up from stop to stop, fade, and heat their fluid once parked.
 
 Each stop starts from the final temperatures of the previous stop. Between the stops, no brake acts
-and only heat flows, with three temperatures per wheel, over minutes. These intervals use the same
-element's equations at the driving speed. A high-order method with error control integrates them
-without substeps of 20 us. The vehicle regains its speed instantly.
+and only heat flows, with three temperatures per wheel, over minutes
+(`bywire.procedures.cooling`). The vehicle regains its speed instantly.
 """
 
 from __future__ import annotations
@@ -12,12 +11,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
-from scipy.integrate import solve_ivp
 
 from bywire.bench.experiment import Case, Experiment, Recordings, as_run
 from bywire.bench.kpis import vehicle_stop
@@ -32,10 +29,14 @@ from bywire.core.quantities import Duration, Unit, Weight
 from bywire.core.signals import Signal, signals_of
 from bywire.core.typing import Array
 from bywire.plant import brake_disc, disc_heat
+from bywire.procedures import cooling
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import simulate
 from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.two_wheeler import cold_start
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Heat = Mapping[str, disc_heat.State]
 """brake temperatures by part"""
@@ -89,15 +90,8 @@ def cooled(heat: Heat, par: TwoWheelerParameters, v: float, t: Array) -> dict[st
     """
     rows: dict[str, Array] = {"time": t}
     for part, (brake, end) in BRAKES.items():
-        law: disc_heat.Parameters = par.value(f"{brake}.heat")
-        felt, capacities = disc_heat.Input(0.0, v, 0.0), np.array(disc_heat.mass(law))
-
-        def rate(_: float, T: Array, law: Any = law, u: Any = felt, C: Array = capacities) -> Array:
-            return np.array(disc_heat.balance(disc_heat.State(*T), u, law)) / C
-
-        span = (0.0, float(t[-1]))
-        solution = solve_ivp(rate, span, heat[part], "DOP853", t_eval=t, rtol=1e-10, atol=1e-8)
-        rows |= {n + end: y for n, y in zip(disc_heat.State._fields, solution.y, strict=True)}
+        course = cooling.cooled(heat[part], par.value(f"{brake}.heat"), v, t)
+        rows |= {f"{name}{end}": y for name, y in course.items()}
     return rows
 
 
@@ -250,6 +244,8 @@ def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]
 
 
 def _dataset(par: TwoWheelerParameters, pieces: list[dict[str, Array]]) -> xr.Dataset:
+    import xarray as xr  # slow to load
+
     known = signals_of(TwoWheelerByWire.Output) | {"stop": _STOP}
     names = ("time", "v", "stop", *TEMPERATURES)
     rows = {name: np.concatenate([each[name] for each in pieces]) for name in names}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import vehicle_stop
@@ -21,6 +21,9 @@ from bywire.core.quantities import Duration
 from bywire.plant import brake_disc
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # The built-in ride is our choice: a light pull, a short hesitation, then full hand force.
 _TIMES = (0.0, 0.25, 0.9, 1.1, 1.3, 1.5, 3.0)  # s

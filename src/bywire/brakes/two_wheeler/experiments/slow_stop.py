@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import vehicle_stop
@@ -21,6 +21,9 @@ from bywire.plant import road, two_wheeler_body
 from bywire.plant.road import Gradient
 from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.two_wheeler import VehicleParameters
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CALM = 2.0  # s after the stop
 

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -28,6 +27,9 @@ from bywire.plant import adhesion, road
 from bywire.plant.road import Distance, SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.two_wheeler import VehicleParameters
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class PanicOptions(ParameterSet):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
@@ -19,6 +19,9 @@ from bywire.core.quantities import Duration, Temperature
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed, ideal_corner_distance
 from bywire.vehicle.surfaces import laid
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class StopOptions(ParameterSet):

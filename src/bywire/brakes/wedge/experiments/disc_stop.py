@@ -7,9 +7,9 @@ disc is at rest. In the other reading the pad then sticks to the disc. The exper
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
@@ -27,6 +27,9 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant.flywheel import DiscSpeed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 READINGS = ("drop", "stick")
 _CALM = 0.05  # time after the stop [s] in which wedge and current may still move

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.families import evaluate, units_of
@@ -31,6 +30,9 @@ from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _BAND = 0.05  # half width of a stable loop's final band, relative to the step
 _LAST = 0.2  # evaluated last fraction of the hold

@@ -6,10 +6,9 @@ The text on these figures does not state any times, so we chose them.
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import xarray as xr
 from pydantic import Field, model_validator
 
 from bywire.bench.energy_ledger import energy_residual
@@ -31,6 +30,9 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Fraction, Unit
 from bywire.core.typing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Count = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
 

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from pydantic import AfterValidator, Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -26,6 +25,9 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Position, Unit
 from bywire.plant import roller_screw
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 BRAKE, SCREWS, MOTORS = "brake", "screws", "motors"
 _BANDS = ("low", "high")

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from itertools import chain
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
@@ -25,6 +25,9 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Inertia
 from bywire.core.typing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 LABELS = ("free", "added", "braked")
 _HALF = 0.5  # fraction of the initial speed at which the range for decelerations ends

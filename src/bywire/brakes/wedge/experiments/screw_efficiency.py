@@ -8,10 +8,9 @@ control follows or is driven back.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -30,6 +29,9 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # --- Efficiency at two forces
 

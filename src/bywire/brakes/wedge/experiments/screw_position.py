@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -20,6 +19,9 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.shaft_rig import friction
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SomeAngle = Annotated[float, Unit("rad", 0.5), Field(gt=0, le=100, allow_inf_nan=False)]
 

@@ -9,9 +9,9 @@ limits of the band.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
@@ -30,6 +30,9 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FREE, DRY = "frictionless", "friction"
 _SHARE = 0.2  # half width of the ramps, relative to the moment

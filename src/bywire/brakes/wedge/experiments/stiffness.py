@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
@@ -25,6 +24,9 @@ from bywire.core.quantities import Current, Duration, Length
 from bywire.core.typing import Array
 from bywire.plant import shaft_encoder
 from bywire.plant.axial_bearing import AngularSpeed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def _heart_case(par: WedgeParameters, stimulus: Stimuli, duration: float, mode: str) -> Case:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import as_run
@@ -15,6 +14,9 @@ from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 from bywire.core.quantities import Current, Duration, Unit
 from bywire.identification.electrics import CurrentLoop, LoopOptions, levels
 from bywire.simulation.run import simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CLAMPED = {"rig.load": "dummy", "rig.clamp": "closed", "rig.mode_1": "current"}
 

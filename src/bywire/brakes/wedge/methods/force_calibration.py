@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -34,6 +33,9 @@ from bywire.identification.trust import Sensor, sensed
 from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SIGNALS: Mapping[str, str] = {"i_1": "A", "i_2": "A", "q_1": "rad", "q_2": "rad", "y_F": "N"}
 """currents, angles, compressive force: name -> SI unit"""

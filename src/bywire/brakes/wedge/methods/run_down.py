@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from bywire.brakes.wedge.case import turned
@@ -41,6 +40,9 @@ from bywire.identification.trust import Sensor, sensed
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _INERTIA = "motor_1.J_M"
 _NAMES = (_INERTIA, "bearing.C_0", "bearing.T_nu", "motor_1.D_M")

@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.brakes.wedge.case import slope_of, turned
@@ -42,6 +41,9 @@ from bywire.identification.residuals import lack_of_fit
 from bywire.identification.trust import Sensor, sensed
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import shaft_encoder
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _STIFFNESS = ("heart.K_S", "heart.K_W", "heart.K_C")
 _S, _W, _C, _ZERO, _CLOSED, _PLAY = range(6)

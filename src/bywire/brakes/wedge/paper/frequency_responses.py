@@ -8,7 +8,6 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.crossings import bandwidth
@@ -24,6 +23,7 @@ from bywire.reproduction.reproduction import Exhibit, Part, Runs
 from bywire.simulation.run import simulate
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 _LOW = "low"

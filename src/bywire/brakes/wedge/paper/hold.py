@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from bywire.brakes.wedge.case import parameters_of, with_friction
 from bywire.brakes.wedge.paper.statements import (
@@ -17,6 +17,9 @@ from bywire.brakes.wedge.paper.statements import (
 )
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _AWAY = 0.2
 """friction coefficient far from the neutral point"""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.running import Result
 from bywire.brakes.wedge.case import mean, swing
@@ -23,6 +23,9 @@ from bywire.brakes.wedge.paper.statements import (
 )
 from bywire.reproduction.item import Fact, Item, compared, found, reading
 from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis, peak
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _TURNS = 20
 """revolutions over which the oscillation is analyzed"""

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from bywire.brakes.wedge.paper.statements import FACTS, MAIN, parameters
 from bywire.plant import roller_screw
 from bywire.report.time_traces import time_traces
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _MICRON = 1e6
 """[N/m] in one N/um"""

@@ -6,8 +6,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-import xarray as xr
-
 from bywire.brakes.wedge.case import FRICTIONLESS
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.panels import BRAKING
@@ -17,6 +15,7 @@ from bywire.core.catalog import PARAMETER_SETS
 from bywire.reproduction.source_file import SourceFile
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 CITATION = roberts2003.FILE.citation

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
-import xarray as xr
 from pydantic import Field, model_validator
 
 from bywire.analysis.locus import Border, locus
@@ -32,6 +31,9 @@ from bywire.synthesis.study import (
     require_ranges,
     variable,
 )
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _POINTS = 200  # frequencies of a disk margin
 _LOWEST = 0.05  # Hz

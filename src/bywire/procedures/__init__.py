@@ -1,0 +1,1 @@
+"""Procedures: sequences of stops with prescribed conditions and limits."""

@@ -1,0 +1,1 @@
+"""Requirements from the files of other tools, and results back into copies of these files."""

@@ -1,0 +1,1 @@
+"""Kinds of evidence for a sign-off. Only a sign-off loads these modules."""

@@ -1,0 +1,132 @@
+"""Evidence that a person provides: an inspection, a test on the road, a review."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any, Literal
+
+from bywire.api.signoff import ManualEntry
+from bywire.bench.requirements import Limit
+from bywire.core.errors import FileError, ParameterError, not_valid, quoted, unknown_of_few
+from bywire.core.section import Name, Section
+from bywire.core.typing import Progress
+from bywire.signoff.plan import Computed, Task
+from bywire.usecases.evidence.entry import Origin, file_digest, require_file
+
+KEYS = ("person", "date", "file", "sha256", "verdict")
+
+
+class ManualSection(Section):
+    """Keys of a manual entry."""
+
+    person: Name
+    date: Any
+    file: Name
+    sha256: Name
+    verdict: Literal["met", "missed"]
+
+
+@dataclass(frozen=True)
+class ManualTask(Task):
+    """Evidence that a person provides.
+
+    Parameters
+    ----------
+    entry
+        The statement with its file.
+    arguments, folder
+        The user's words, and the folder of the sign-off file.
+    """
+
+    entry: ManualEntry
+    arguments: Mapping[str, Any]
+    folder: Path
+
+    @property
+    def origin(self) -> Origin:
+        """The reader with the user's words, for another process."""
+        return read_manual, (self.entry.what, self.arguments, self.folder)
+
+    @property
+    def title(self) -> str:
+        """The user's words in one line."""
+        return f"manual {self.entry.what}"
+
+    @property
+    def identity(self) -> Mapping[str, Any]:
+        """Everything that affects its figures."""
+        entry = self.entry
+        return {
+            "kind": "manual",
+            "what": entry.what,
+            "person": entry.person,
+            "date": entry.date,
+            "file": entry.file.name,
+            "digest": entry.digest,
+            "verdict": entry.verdict,
+        }
+
+    def limit(self, text: str) -> Limit:
+        """Return a limit of one of its figures."""
+        raise ParameterError(
+            "[[evidence]] manual accepts no limit, because the person decides. Remove limit",
+            name="limit",
+            value=text,
+        )
+
+    def compute(self, folder: Path, progress: Progress) -> Computed:
+        """Compute the result, and write its report."""
+        del progress
+        self.entry.write(folder)
+        return Computed(self.entry)
+
+
+def read_manual(what: str, arguments: Mapping[str, Any], folder: Path) -> ManualTask:
+    """Read a manual entry, and compare its file with the digest.
+
+    Raises
+    ------
+    FileError
+        If the file is missing or has changed.
+    InputError
+        For other invalid entries.
+    """
+    for name in arguments:
+        if name not in KEYS:
+            raise unknown_of_few("key of [[evidence]] manual", name, (*KEYS, "shows", "note"))
+    path = arguments.get("file")
+    if isinstance(path, str) and "sha256" not in arguments:
+        require_file(folder / path)
+        raise ParameterError(
+            "[[evidence]] manual needs the digest of its file, so that a later change is noticed. "
+            f'Add sha256 = "{file_digest(folder / path)}"',
+            name="sha256",
+        )
+    section = ManualSection.read(arguments, "[[evidence]] manual")
+    file = folder / section.file
+    require_file(file)
+    found = file_digest(file)
+    if found != section.sha256.lower():
+        raise FileError(
+            f"{file} has changed: its SHA-256 digest is {found}, not {section.sha256}. Inspect the "
+            "file again, and update person, date and sha256",
+            name=str(file),
+            value=found,
+            valid=section.sha256,
+        )
+    entry = ManualEntry(what, section.person, _date(section.date), file, found, section.verdict)
+    return ManualTask(entry, arguments, folder)
+
+
+def _date(value: Any) -> str:
+    """Return a date as ``YYYY-MM-DD``."""
+    try:
+        day = value if type(value) is date else date.fromisoformat(value)
+    except (TypeError, ValueError):
+        raise not_valid(
+            "[[evidence]] date", quoted(value), "a date such as 2026-11-27", kind=ParameterError
+        ) from None
+    return day.isoformat()
