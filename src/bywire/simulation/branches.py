@@ -20,7 +20,7 @@ _FREE = _TRUTHS | {"if_else_zero", "select", "neg"}  # about the cost of detecti
 _COST = {"inv": 8.0, "sqrt": 8.0, "exp": 40.0, "sin": 40.0, "cos": 40.0, "log": 40.0, "pow": 60.0}
 _WORTH_ATOM, _WORTH_MODE = 4.0, 0.15
 _SELECTIONS = ("if_else_zero", "select")
-_AHEAD = 40  # maximum number of operations to compute earlier for a costly function
+_AHEAD = 40  # maximum number of further operations to compute early for a costly function
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def modes(graph: Graph, roots: Sequence[Node], level: Levels) -> Modes:
 
 
 def _costly_first(graph: Graph, order: Sequence[Node]) -> list[Node]:
-    """Return an order that begins with costly functions, except those that need many operations.
+    """Return an order that begins with costly functions, if they need few further operations.
 
     A processor computes a few hundred instructions at the same time. If a long function is needed
     soon after it begins, the processor waits for it.
