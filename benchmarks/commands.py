@@ -5,9 +5,10 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from benchmarks.result import Result, at_most, failed
 from bywire.core import child_process
@@ -86,7 +87,11 @@ def _kernels() -> set[str]:
     return {path.name for path in usable_folder().glob("*.so")}
 
 
-def seconds_of(line: Sequence[str], limit: float | None = None) -> float:
+def seconds_of(
+    line: Sequence[str],
+    limit: float | None = None,
+    changes: Mapping[str, str] = MappingProxyType({}),
+) -> float:
     """Return the run time of a process [s], without showing its output.
 
     Parameters
@@ -95,6 +100,8 @@ def seconds_of(line: Sequence[str], limit: float | None = None) -> float:
         Command line of a command of bywire, or of another program.
     limit
         Maximum run time [s]. Default: none.
+    changes
+        Additional environment variables.
 
     Raises
     ------
@@ -106,7 +113,7 @@ def seconds_of(line: Sequence[str], limit: float | None = None) -> float:
     begin = time.perf_counter()
     done = subprocess.run(
         line,
-        env=environment(),
+        env=environment() | dict(changes),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         encoding="utf-8",
