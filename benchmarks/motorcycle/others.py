@@ -24,7 +24,7 @@ from benchmarks.motorcycle.problem import (
 )
 from benchmarks.result import Result, at_least, failed
 from benchmarks.suite import Part
-from benchmarks.timing import timed
+from benchmarks.timing import processor_timed
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.catalog import parameters
 from bywire.simulation.run import simulate
@@ -100,7 +100,7 @@ def _compare(par: MotorcycleParameters, peer: Peer, exact: Solution) -> Result:
 
 
 def _plain(run: object) -> tuple[float, ...]:
-    work = timed(partial(simulate, run, ("p_mc",)))  # type: ignore[arg-type]
+    work = processor_timed(partial(simulate, run, ("p_mc",)))  # type: ignore[arg-type]
     return tuple(work() for _ in range(15))
 
 
