@@ -387,7 +387,7 @@ def executor_of(
         return Cluster(cluster)
     at_once = together or chunks
     if engine == CUDA:
-        count = worker_count(workers, max(at_once // (1 if workers else _LEAST_TOGETHER), 1))
+        count = workers_on_device(workers, at_once)
         rounds = -(-at_once // (count * _TOGETHER))
         batch = -(-at_once // (count * rounds))
         return Pool(count, batch) if count > 1 else InProcess(batch)
@@ -396,12 +396,18 @@ def executor_of(
     return Pool(count) if count > 1 and is_worth else InProcess()
 
 
+def workers_on_device(workers: int | None, chunks: int) -> int:
+    """Return the number of processes for a number of chunks on a graphics processor."""
+    return worker_count(workers, max(chunks if workers else chunks // _LEAST_TOGETHER, 1))
+
+
 def _fitting(plan: StudyPlan, together: int, workers: int) -> int:
-    """Return the number of chunks per batch, few enough for this machine's memory."""
+    """Return the number of chunks per batch, split evenly if they exceed this machine's memory."""
     if together == 1:
         return 1
     size = 8 * CHUNK * numbers_per_case(plan.bench)
-    return max(min(together, int(_SHARE * machine_memory() / workers / size)), 1)
+    most = max(int(_SHARE * machine_memory() / workers / size), 1)
+    return -(-together // -(-together // most))
 
 
 def require_workers(workers: int | None, cluster: str, engine: str) -> None:
