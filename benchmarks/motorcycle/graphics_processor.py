@@ -31,7 +31,7 @@ from bywire.core.child_process import python_command
 from bywire.core.errors import DeviceError, ParameterError
 from bywire.core.machine import worker_count
 from bywire.core.typing import Array
-from bywire.simulation.cuda_device import Memory, find_device
+from bywire.simulation.cuda_device import OTHERWISE, Memory, find_device
 from bywire.simulation.ensemble import Ensemble, simulate_ensemble
 from bywire.simulation.run import Run
 from bywire.studies.store import CASE, StudyStore
@@ -124,7 +124,8 @@ def measured() -> Iterator[Result]:
     try:
         device = find_device()
     except (DeviceError, ParameterError) as error:
-        yield Result("gpu", None, "1", note=f"no row of this part is measured: {error}")
+        reason = str(error).replace(f", {OTHERWISE}", "")
+        yield Result("gpu", None, "1", note=f"no row of this part is measured: {reason}")
         return
     yield Result(
         "gpu.start",

@@ -164,3 +164,4 @@ def test_a_batch_for_a_graphics_processor_fits_into_this_machines_memory(study, 
     monkeypatch.setattr(executor, "machine_memory", lambda: 12.5 * size)
     assert [executor._fitting(plan, 100, workers) for workers in (1, 2, 20)] == [6, 3, 1]
     assert executor._fitting(plan, 2, 1) == 2
+    assert executor._fitting(plan, 7, 1) == 4  # and then 3, instead of 6 and 1

@@ -25,7 +25,7 @@ from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
-from bywire.bench.step_choice import with_chosen_step
+from bywire.bench.step_choice import exceeded, with_chosen_step
 from bywire.core.arguments import require_kinds
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Progress
@@ -148,7 +148,7 @@ class BenchResult(Result, Answer):
     @property
     def warnings(self) -> list[str]:
         """Warnings about the bench and its runs."""
-        return [*self.bench.outdated, *super().warnings]
+        return [*self.bench.outdated, *super().warnings, *filter(None, [exceeded(self)])]
 
     @property
     def rows(self) -> list[KpiRow]:

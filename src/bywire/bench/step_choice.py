@@ -15,10 +15,9 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench import running
@@ -34,6 +33,9 @@ from bywire.core.errors import BywireError, DeviceError, InputError, RunError, S
 from bywire.core.typing import Array, Progress
 from bywire.core.units import shown
 from bywire.simulation.run_table import doubts_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _PERCENT = 100.0
 _COUNTS = sorted(2**a * 5**b for a in range(1, 24) for b in range(10))
@@ -126,22 +128,20 @@ def exceeded(result: Result) -> str:
     if bench.choice is None or not result.recordings:
         return ""
     scales, intervals = scales_of(bench, result.recordings), _intervals(bench)
-    errors = {}
+    texts = []
     for kpi in result.kpis:
         scale = max(abs(kpi.value), scales.full.get(kpi.name, 0.0))
-        if kpi.name in (bench.limits or [kpi.name]) and scale > 0.0 and not math.isnan(kpi.error):
-            read = reading_error(kpi.value, intervals) if kpi.unit == "s" else 0.0
-            factor = 1.0 if kpi.converges else BOUND
-            errors[kpi.name] = factor * max(kpi.error - read, 0.0) / scale
-    return _exceeded(bench.choice.stated, errors)
-
-
-def _exceeded(stated: float, errors: Mapping[str, float]) -> str:
-    large = [name for name, error in errors.items() if error > stated]
-    if not large:
+        if kpi.name not in (bench.limits or [kpi.name]) or not scale > 0.0:
+            continue
+        beside = scales.rounding.get(kpi.unit, 0.0)
+        beside += reading_error(kpi.value, intervals) if kpi.unit == "s" else 0.0
+        error = (1.0 if kpi.converges else BOUND) * max(kpi.error - beside, 0.0) / scale
+        if error > bench.choice.stated * (1.0 + error):  # the choice also scales with other steps
+            texts.append(f"{kpi.name} {percent_text(error)}")
+    if not texts:
         return ""
-    texts = ", ".join(f"{name} {percent_text(errors[name])}" for name in large)
-    return f"numerical errors exceed simulation.error = {error_text(stated)}: {texts}"
+    stated = error_text(bench.choice.stated)
+    return f"numerical errors exceed simulation.error = {stated}: {', '.join(texts)}"
 
 
 def percent_text(error: float) -> str:
@@ -390,7 +390,7 @@ class _Trials:
         """
         trial = self.at(step)
         errors = trial.errors
-        if trial.doubt or errors.reached > stated or _HALF * step < FINEST:
+        if trial.doubt or errors.reached > stated:
             return trial
         half = self.at(_HALF * step).errors
         if not half.each:

@@ -222,20 +222,9 @@ class CudaKernel:
                 numbers = [*plan_array(schedule, first, last, self._signals)]
                 numbers += [self.lanes, recording.cases, ahead, *recording.apart, *frames, *where]
                 memory.put(plan, np.array(numbers, dtype=np.int64))
-                memory.run(
-                    self._function,
-                    -(-self.lanes // THREADS),
-                    THREADS,
-                    (
-                        par,
-                        float(schedule.step),
-                        given.place,
-                        state,
-                        plan,
-                        int(room) + recording.offset,
-                        edges,
-                    ),
-                )
+                place, step = int(room) + recording.offset, float(schedule.step)
+                arguments = (par, step, given.place, state, plan, place, edges)
+                memory.run(self._function, -(-self.lanes // THREADS), THREADS, arguments)
                 recording.count += counts[number]
             recording.fetch(memory, room)
             memory.get(state, vector)

@@ -109,7 +109,7 @@ _AHEAD = 2  # tasks in flight for each worker, so that no worker is idle
 _MOST = 4
 
 _Task = tuple[float, list[tuple[int, Columns]]]
-"""result of a task: time [s], and its chunks"""
+"""result of a task: processor time [s], and its chunks"""
 
 
 class _Tasks:
@@ -122,7 +122,7 @@ class _Tasks:
     workers
         Number of workers that share them.
     seconds
-        Target duration of a task [s].
+        Target processor time of a task [s].
     most
         Maximum number of chunks in a task.
     """
@@ -151,17 +151,17 @@ class _Tasks:
 
 
 def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan, threads: int | None = 1) -> _Task:
-    """Return chunks, of which several are computed together, and their computing time."""
-    begin = time.perf_counter()
+    """Return chunks, of which several are computed together, and their processor time."""
+    begin = time.process_time()  # does not depend on other programs, unlike the elapsed time
     batches = (computed_chunks(plan, batch, threads) for batch in batched(chunks, _MOST))
     given = [computed for batch in batches for computed in batch]
-    return time.perf_counter() - begin, given
+    return time.process_time() - begin, given
 
 
 # --- On a cluster of dask.distributed
 
 _SECONDS = 10.0  # time limit to reach a cluster
-_TASK = 0.5  # s: target duration of a task of a cluster
+_TASK = 0.5  # s: target processor time of a task of a cluster
 # Dask works periodically: stack samples every 10 ms, ticks every 20 ms, memory checks every 100 ms.
 # A core's worker, scheduler and client use 8 % of a core for this, or 1.4 % with these settings.
 CLUSTER_SETTINGS = {
@@ -272,7 +272,7 @@ def _lost(client: Any, error: BaseException) -> str:
 
 # --- Choice of the executor
 
-_POOLED = 0.2  # s: target duration of a task in a pool; a killed study loses its tasks
+_POOLED = 0.2  # s: target processor time of a task in a pool; a killed study loses its tasks
 # Chunks in one batch on a graphics processor. Up to 8,192 cases, a kernel takes as long as for one
 # case, and processes take turns. So a batch has at least 2,048 cases if there are that many, and at
 # most as many as the largest processors hold.
@@ -387,7 +387,7 @@ def executor_of(
         return Cluster(cluster)
     at_once = together or chunks
     if engine == CUDA:
-        count = worker_count(workers, max(at_once // (1 if workers else _LEAST_TOGETHER), 1))
+        count = workers_on_device(workers, at_once)
         rounds = -(-at_once // (count * _TOGETHER))
         batch = -(-at_once // (count * rounds))
         return Pool(count, batch) if count > 1 else InProcess(batch)
@@ -396,12 +396,18 @@ def executor_of(
     return Pool(count) if count > 1 and is_worth else InProcess()
 
 
+def workers_on_device(workers: int | None, chunks: int) -> int:
+    """Return the number of processes for a number of chunks on a graphics processor."""
+    return worker_count(workers, max(chunks if workers else chunks // _LEAST_TOGETHER, 1))
+
+
 def _fitting(plan: StudyPlan, together: int, workers: int) -> int:
-    """Return the number of chunks per batch, few enough for this machine's memory."""
+    """Return the number of chunks per batch, split evenly if they exceed this machine's memory."""
     if together == 1:
         return 1
     size = 8 * CHUNK * numbers_per_case(plan.bench)
-    return max(min(together, int(_SHARE * machine_memory() / workers / size)), 1)
+    most = max(int(_SHARE * machine_memory() / workers / size), 1)
+    return -(-together // -(-together // most))
 
 
 def require_workers(workers: int | None, cluster: str, engine: str) -> None:

@@ -16,7 +16,7 @@ from bywire.core.typing import Progress
 from bywire.simulation.cuda_device import find_device
 from bywire.simulation.engine import CUDA
 from bywire.studies.designs import WORST
-from bywire.studies.executor import executor_of, require_workers
+from bywire.studies.executor import executor_of, require_workers, workers_on_device
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.sought_cases import rare_failures, worst_cases
 from bywire.studies.store import Origin, StudyStore
@@ -38,13 +38,13 @@ class Completed:
     damaged: int
 
 
-def _workers_on_device(workers: int | None) -> int | None:
+def _allowed_workers(workers: int | None, chunks: int) -> int | None:
     """Return the number of processes on the graphics processor, or fail if there is none.
 
     A copy of this process looks for it if workers will be copies too, because copies of a process
     that has used the driver cannot use it.
     """
-    if may_copy():
+    if workers_on_device(workers, chunks) > 1 and may_copy():
         with processes_with_brakes(1, "check the driver") as pool:
             label = pool.submit(_exclusive_device).result()
     else:
@@ -112,7 +112,7 @@ def complete(
     until = time.monotonic() + plan.time
     require_workers(workers, cluster, plan.bench.engine)
     if plan.bench.engine == CUDA:
-        workers = _workers_on_device(workers)  # fails here, before the folder is created
+        workers = _allowed_workers(workers, plan.chunks)  # fails here, before the folder is created
     claim: Callable[[], object] = partial(store.open, plan, origin)
     if store.folder.exists() or plan.sought is not None:
         claim()
@@ -120,6 +120,8 @@ def complete(
     try:
         return _completed(plan, store, workers, cluster, progress, (claim, meanwhile), until)
     except DeviceError as error:
+        if not store.folder.exists():
+            raise
         kept = f"Finished chunks are saved: type '{store.resume_command}' to continue"
         raise error.reworded(f"{error}. {kept}") from None
 

@@ -109,6 +109,7 @@ class LoopFamily:
         self.shared: dict[str, FunctionType] = {}  # in an order in which each follows its arguments
         self._module = module
         self._looked_at = 0  # rows of single runs
+        self.is_on_device = True  # unless the compiler rejects it
         self._optional: dict[str, bool] = {}  # signals, and whether they may be missing
         for each in self.measures.values():
             self._take(each.__wrapped__)
