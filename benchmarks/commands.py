@@ -1,13 +1,14 @@
-"""Run time of whole commands, relative to the import time of the libraries that bywire needs."""
+"""CPU time of whole commands, relative to that of importing the libraries that bywire needs."""
 
 from __future__ import annotations
 
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from benchmarks.result import Result, at_most, failed
 from bywire.core import child_process
@@ -23,7 +24,7 @@ _SLOW = 8.0  # goal above which a command runs only once
 
 @dataclass(frozen=True)
 class Command:
-    """A command whose run time is a figure of the benchmark. Each folder declares its commands.
+    """A command whose CPU time is a figure of the benchmark. Each folder declares its commands.
 
     Parameters
     ----------
@@ -32,7 +33,7 @@ class Command:
     arguments
         Arguments of ``bywire``. ``{folder}`` is a temporary folder of the benchmark.
     goal
-        Maximum run time in units of L.
+        Maximum CPU time in units of L.
     first
         Arguments of a command that runs once before, for example to record data for a replay.
     """
@@ -61,18 +62,18 @@ def measured(commands: Sequence[Command]) -> Iterator[Result]:
 def _measured(command: Command, folder: Path) -> Result:
     line = _line(command.arguments, folder)
     if command.first:
-        seconds_of(_line(command.first, folder))
-    seconds_of(_UNIT)
+        processor_seconds_of(_line(command.first, folder))
+    processor_seconds_of(_UNIT)
     libraries, taken = [], []
     before = _kernels()
     for _ in range(command.rounds):
-        libraries.append(seconds_of(_UNIT))
-        taken.append(seconds_of(line))
+        libraries.append(processor_seconds_of(_UNIT))
+        taken.append(processor_seconds_of(line))
     if len(taken) == 1 and _kernels() != before:  # it compiled
-        taken.append(seconds_of(line))
-    libraries.append(seconds_of(_UNIT))
+        taken.append(processor_seconds_of(line))
+    libraries.append(processor_seconds_of(_UNIT))
     least, unit = min(taken), min(libraries)
-    note = f"{' '.join(command.arguments)}: {least:.3g} s; L = {unit:.3g} s; "
+    note = f"{' '.join(command.arguments)}: {least:.3g} s of CPU time; L = {unit:.3g} s; "
     note += f"minimum of {len(taken)} in turn" if len(taken) > 1 else "run once"
     return at_most(command.name, least / unit, command.goal, "L", note.replace(" {folder}", " ..."))
 
@@ -86,7 +87,11 @@ def _kernels() -> set[str]:
     return {path.name for path in usable_folder().glob("*.so")}
 
 
-def seconds_of(line: Sequence[str], limit: float | None = None) -> float:
+def seconds_of(
+    line: Sequence[str],
+    limit: float | None = None,
+    changes: Mapping[str, str] = MappingProxyType({}),
+) -> float:
     """Return the run time of a process [s], without showing its output.
 
     Parameters
@@ -95,6 +100,8 @@ def seconds_of(line: Sequence[str], limit: float | None = None) -> float:
         Command line of a command of bywire, or of another program.
     limit
         Maximum run time [s]. Default: none.
+    changes
+        Additional environment variables.
 
     Raises
     ------
@@ -106,7 +113,7 @@ def seconds_of(line: Sequence[str], limit: float | None = None) -> float:
     begin = time.perf_counter()
     done = subprocess.run(
         line,
-        env=environment(),
+        env=environment() | dict(changes),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         encoding="utf-8",
@@ -118,6 +125,28 @@ def seconds_of(line: Sequence[str], limit: float | None = None) -> float:
     if done.returncode not in _ANSWERED:
         raise subprocess.CalledProcessError(done.returncode, line, stderr=done.stderr)
     return seconds
+
+
+def processor_seconds_of(line: Sequence[str]) -> float:
+    """Return the CPU time of a process and its children [s]; its run time on Windows.
+
+    Raises
+    ------
+    CalledProcessError
+        If the process fails.
+    """
+    try:
+        import resource
+    except ImportError:  # Windows does not add up the times of a process's children
+        return seconds_of(line)
+
+    def used() -> float:
+        ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return ended.ru_utime + ended.ru_stime
+
+    begin = used()
+    seconds_of(line)
+    return used() - begin
 
 
 def environment() -> dict[str, str]:

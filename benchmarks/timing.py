@@ -1,4 +1,4 @@
-"""Run times of functions, measured in turn, and of one call of a compiled kernel."""
+"""Times of functions, measured in turn, and of one call of a compiled kernel."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def processor_timed(work: Callable[[], object]) -> Work:
 
 
 def kernel(run: Run) -> Work:
-    """Return one call of the compiled kernel, with everything prepared as in the hand-written C."""
+    """Return the processor time of a call of the kernel, prepared as the hand-written C is."""
     engine = prepare(run.model, run.par).engine("compiled")
     request = request_for(run)
     rows = np.empty((request.schedule.rows, request.selection.size))
@@ -66,8 +66,8 @@ def kernel(run: Run) -> Work:
 
     def work() -> float:
         vector = start.copy()
-        begin = time.perf_counter()
+        begin = time.process_time()
         engine.advance(request, vector, 0, request.schedule.frames, rows)
-        return time.perf_counter() - begin
+        return time.process_time() - begin
 
     return work

@@ -102,6 +102,7 @@ class EmulatedDriver:
         self.locked: dict[int, Any] = {}  # this machine's memory
         self.launches: list[int] = []  # threads of each that computes cases
         self.entries: list[str] = []  # of all launches
+        self.libraries: dict[str, Path] = {}  # of the last kernel with each name
         self.most = 0  # bytes that were taken at once
         self.copies = 0  # to this machine's memory
         self.version, self.mode = 12040, 0
@@ -202,7 +203,11 @@ class EmulatedDriver:
         return (OK,)
 
     def cuModuleLoadData(self, binary: bytes) -> Any:
-        return OK, load(compiled_here(binary.decode()), "emulated")
+        source = binary.decode()
+        library, head = compiled_here(source), _HEAD.search(source)
+        assert head
+        self.libraries[head[1]] = library
+        return OK, load(library, "emulated")
 
     def cuModuleGetFunction(self, module: Any, name: bytes) -> Any:
         assert name.startswith(b"bw_")

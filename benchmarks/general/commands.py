@@ -8,7 +8,7 @@ from benchmarks.suite import Part
 
 GENERAL = (
     Command("command.help", ("--help",), 0.6),
-    Command("command.list", ("list",), 0.6),
+    Command("command.list", ("list",), 0.3),
 )
 
 PART = Part("commands", lambda: measured([*declared(Command).values()]))

@@ -15,6 +15,8 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 
 WIDTH = 3e-4
 TOLERANCE = 1e-7
+SETTINGS = ((5e-4, 1e-6), (WIDTH, TOLERANCE))
+"""widths and tolerances that the benchmark compares"""
 MAX_STEPS = 1_000_000
 
 

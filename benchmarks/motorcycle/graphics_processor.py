@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, cast
 from unittest.mock import patch
 
@@ -28,7 +31,7 @@ from bywire.core.child_process import python_command
 from bywire.core.errors import DeviceError, ParameterError
 from bywire.core.machine import worker_count
 from bywire.core.typing import Array
-from bywire.simulation.cuda_device import Memory, find_device
+from bywire.simulation.cuda_device import OTHERWISE, Memory, find_device
 from bywire.simulation.ensemble import Ensemble, simulate_ensemble
 from bywire.simulation.run import Run
 from bywire.studies.store import CASE, StudyStore
@@ -117,11 +120,19 @@ class _Row:
 
 def measured() -> Iterator[Result]:
     """Measure cases per second of a graphics processor, and check its results."""
+    begin = time.perf_counter()
     try:
         device = find_device()
     except (DeviceError, ParameterError) as error:
-        yield Result("gpu", None, "1", note=f"no row of this part is measured: {error}")
+        reason = str(error).replace(f", {OTHERWISE}", "")
+        yield Result("gpu", None, "1", note=f"no row of this part is measured: {reason}")
         return
+    yield Result(
+        "gpu.start",
+        time.perf_counter() - begin,
+        "s",
+        note=f"start of the driver and its context in one process on {device.label}",
+    )
     clock = _Clock()
     run = braking_run(cast(MotorcycleParameters, parameters("dardanelli2010")), hard_braking)
     at_cores: dict[int, float] = {}
@@ -138,6 +149,7 @@ def measured() -> Iterator[Result]:
             _study_row(STUDIES[0], studies),
             *(_longer_row(name, studies) for name in _LONGER),
             *(_study_row(cases, studies) for cases in STUDIES[1:]),
+            _Row("gpu.study_service", "1/s", "", studies.with_service),
             _Row(
                 "gpu.study_difference",
                 "1",
@@ -209,8 +221,11 @@ def _ensemble(run: Run, cases: int, at_cores: dict[int, float], clock: _Clock) -
     varied, beside = _varied(run, cases), min(cases, BESIDE)
     there = partial(simulate_ensemble, run, varied, _ONE, engine="cuda")
     with _timed_kernels() as kernels:
-        seconds = min(interleaved({"gpu": timed(there)}, _ROUNDS)["gpu"])
-        alone = sum(kernels) / (_ROUNDS + 1)
+        both = []
+        for _ in range(_ROUNDS + 1):  # the first one is a warm-up
+            kernels.clear()
+            both.append((timed(there)(), sum(kernels)))
+    seconds, alone = map(min, zip(*both[1:], strict=True))
     if beside not in at_cores:
         few = {name: values[:beside] for name, values in varied.items()}
         lanes = timed(partial(simulate_ensemble, run, few, _ONE))
@@ -308,13 +323,63 @@ class _Studies:
         path.write_text(text, encoding="utf-8")
         return path
 
-    def _seconds(self, study: Path, cases: int, engine: str, *more: str) -> tuple[float, Path]:
-        """Return the run time of a command [s], and its folder."""
+    def with_service(self) -> list[Result]:
+        """Measure the largest study with NVIDIA's multi-process service."""
         self._clock.require()
-        out = self._folder / f"{study.stem}-{engine}-{cases}"
+        with _service(self._folder) as changes:
+            taken, _ = self._seconds(
+                _TOLERANCES, STUDIES[-1], "cuda", name="service", changes=changes
+            )
+        note = (
+            f"study of {STUDIES[-1]} cases as above, while NVIDIA's multi-process service lets the "
+            f"kernels of several processes run at the same time: {taken:.3g} s"
+        )
+        return [Result("gpu.study_service", STUDIES[-1] / taken, "1/s", note=note)]
+
+    def _seconds(
+        self,
+        study: Path,
+        cases: int,
+        engine: str,
+        *more: str,
+        name: str = "",
+        changes: Mapping[str, str] = MappingProxyType({}),
+    ) -> tuple[float, Path]:
+        """Return the run time of a command [s], and its folder.
+
+        ``name``: suffix of the folder; ``changes``: additional environment variables.
+        """
+        self._clock.require()
+        out = self._folder / f"{study.stem}-{engine}-{cases}{name}"
         arguments = ("study", "run", str(study), "--out", str(out), "--cases", str(cases))
         line = python_command("-m", "bywire.cli", *arguments, "--engine", engine, *more)
-        return seconds_of(line, self._clock.left()), out
+        return seconds_of(line, self._clock.left(), changes), out
+
+
+_CONTROL, _CONTROL_SECONDS = "nvidia-cuda-mps-control", 20.0
+
+
+@contextmanager
+def _service(folder: Path) -> Iterator[Mapping[str, str]]:
+    """Run NVIDIA's multi-process service in a folder; yield the variables that select it."""
+    program = shutil.which(_CONTROL)
+    if program is None:
+        raise _SkippedRowError(f"skipped, because {_CONTROL} is not installed")
+    changes = {f"CUDA_MPS_{kind}_DIRECTORY": str(folder) for kind in ("PIPE", "LOG")}
+    control = partial(
+        subprocess.run,
+        env={**os.environ, **changes},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=_CONTROL_SECONDS,
+        check=True,
+    )
+    control([program, "-d"], stdin=subprocess.DEVNULL)
+    try:
+        yield changes
+    finally:
+        control([program], input="quit\n")
 
 
 def _study_row(cases: int, studies: _Studies) -> _Row:

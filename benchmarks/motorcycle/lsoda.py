@@ -22,6 +22,8 @@ from bywire.core.typing import Array
 
 WIDTH = 3e-4
 TOLERANCE = 1e-7
+SETTINGS = ((WIDTH, TOLERANCE), (WIDTH, 3e-8))
+"""widths and tolerances that the benchmark compares"""
 MAX_STEPS = 100_000
 
 

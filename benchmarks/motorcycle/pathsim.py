@@ -20,6 +20,8 @@ from bywire.core.typing import Array
 DURATION = 0.3
 WIDTH = 3e-4
 TOLERANCE = 1e-3
+SETTINGS = ((1e-3, TOLERANCE), (5e-4, 3e-3), (WIDTH, TOLERANCE))
+"""widths and tolerances that the benchmark compares"""
 FIRST_STEP = 1e-5
 IMPLICIT = 1e-3  # tolerance of the implicit equations relative to the step's tolerance
 

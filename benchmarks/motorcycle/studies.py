@@ -12,15 +12,16 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from benchmarks.commands import environment
-from benchmarks.judging import simulated_and_judged
+from benchmarks.judging import CHUNKS, simulated_and_judged
 from benchmarks.result import Result, at_least, at_most
+from benchmarks.stated_error import of_stated_error
 from benchmarks.suite import Part
 from bywire.core.child_process import python_command
 from bywire.core.libraries import allow_dask
 from bywire.data.file_format import library
 from bywire.studies.executor import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster, Executor, Pool
 from bywire.studies.plan import CHUNK, StudyPlan
-from bywire.studies.store import computed_chunk
+from bywire.studies.store import Origin, StudyStore, computed_chunk, computed_chunks
 from bywire.studies.study_file import read_study
 
 _STUDY = """
@@ -51,9 +52,10 @@ overshoot = "<= 15 % with 99 %"
 steady_state_error = "<= 0.1 bar"
 rise_time = "<= 100 ms with 95 %"
 """
+_STATED = ("0.1 %", "1 %")  # numerical errors that the bench of a study states
 _COMMANDS = 2  # number of commands, of which the faster one counts
-_CHUNKS = 4
-_ROUNDS = 3
+_CASES_AT = CHUNKS * CHUNK  # cases that are computed together
+_ROUNDS = 6
 _WARM = 4  # warm-up chunks of each process
 _STEADY = 4.0  # s of measurement: a cluster's last tasks take half a second
 _TURNS = 3  # turns of processes and cluster, of which the fastest counts
@@ -78,8 +80,9 @@ def studies() -> Iterator[Result]:
         path.write_text(_STUDY, encoding="utf-8")
         plan = read_study(path)
         computed_chunk(plan, 0, threads=1)  # the kernel is built
-        whole = min(_seconds(plan) for _ in range(_ROUNDS)) / (_CHUNKS * CHUNK)
+        whole = min(_seconds(plan) for _ in range(_ROUNDS)) / _CASES_AT
         simulated, judged = simulated_and_judged(plan, _ROUNDS)
+        stored = min(_stored(plan, path, Path(folder) / str(k)) for k in range(_ROUNDS)) / _CASES_AT
         cores = os.cpu_count() or 1
         yield at_most(
             "study.million_seconds",
@@ -87,7 +90,7 @@ def studies() -> Iterator[Result]:
             600.0,
             "s",
             f"a million stops with all key figures on {cores} cores, {1e3 * whole:.3g} ms of core "
-            f"time each, measured over {_CHUNKS * CHUNK} stops",
+            f"time each, measured over {_CASES_AT} stops",
         )
         yield at_most(
             "study.kpi_share",
@@ -98,12 +101,19 @@ def studies() -> Iterator[Result]:
             f"{1e3 * simulated:.3g} ms",
         )
         yield _of_steps(Path(folder))
-        yield Result(
+        beside = whole - simulated + stored
+        yield at_most(
             "study.beside_share",
-            (whole - simulated - judged) / simulated,
+            beside / simulated,
+            0.06,
             "1",
-            note="creating and checking cases, warnings and balances, relative to the simulation",
+            f"creating, checking, judging and storing cases, {1e6 * beside:.3g} us per case, of "
+            f"which storing {1e6 * stored:.3g} us, relative to the simulation",
         )
+        many = Path(folder) / "many.toml"
+        many.write_text(_MANY, encoding="utf-8")
+        for error in _STATED:
+            yield from of_stated_error(many, error, f"study.error_{error.split()[0]}")
         yield _command(Path(folder))
         if Path("/proc/self/status").exists():
             yield _memory(path, Path(folder) / "out")
@@ -113,8 +123,17 @@ def studies() -> Iterator[Result]:
 
 def _seconds(plan: StudyPlan) -> float:
     begin = time.process_time()
-    for chunk in range(_CHUNKS):
-        computed_chunk(plan, chunk, threads=1)
+    computed_chunks(plan, range(CHUNKS), threads=1)
+    return time.process_time() - begin
+
+
+def _stored(plan: StudyPlan, file: Path, folder: Path) -> float:
+    """Return the processor time to store the same cases [s]."""
+    store, given = StudyStore(folder), computed_chunks(plan, range(CHUNKS), threads=1)
+    store.open(plan, Origin(file))
+    begin = time.process_time()
+    for chunk, columns in given:
+        store.write(chunk, columns, plan.column_units)
     return time.process_time() - begin
 
 

@@ -46,10 +46,10 @@ class Call:
     _call: Callable[[], None]
 
     def __call__(self) -> float:
-        """Compute once and return the run time [s]."""
-        begin = time.perf_counter()
+        """Compute once and return the processor time [s]."""
+        begin = time.process_time()
         self._call()
-        return time.perf_counter() - begin
+        return time.process_time() - begin
 
     def __getitem__(self, name: str) -> Array:
         """Return one output, shape (cases, rows)."""

@@ -17,7 +17,6 @@ from benchmarks.timing import (
     kernel,
     least_ratio,
     processor_timed,
-    ratio,
     timed,
 )
 from benchmarks.wedge import tanh_rk4
@@ -46,6 +45,7 @@ VARIED = (
 )
 SIGNALS = ("x", "y_M", "i_1")
 _ROUNDS, _ENSEMBLE_ROUNDS = 30, 3
+_PER_DOUBLE = 7.5 / 8  # goal of the ensemble for each double of a vector
 # Regularized friction: the step at which a run takes one second, and the widths with the least
 # error at this step.
 _WIDTH, _WIDTH_V, _TANH_STEP = 0.03, 1e-5, 1e-6
@@ -71,7 +71,7 @@ def single(par: WedgeParameters) -> list[Result]:
         {
             "bywire": kernel(run),
             "hand": opponent,
-            "plain": timed(partial(simulate, run, ("y_M", "x"))),
+            "plain": processor_timed(partial(simulate, run, ("y_M", "x"))),
         },
         _ROUNDS,
     )
@@ -79,18 +79,18 @@ def single(par: WedgeParameters) -> list[Result]:
     return [
         at_most(
             "wedge.single.hand_c",
-            ratio(seconds, "bywire", "hand"),
-            1.0,
+            least_ratio(seconds, "bywire", "hand"),
+            0.9,
             "ratio",
             f"one run of Fig. 7, {run.duration:g} s, all outputs, relative to hand-written C "
             f"with a fully iterated implicit midpoint, {passes:.2f} passes per substep; same "
-            "compiler and flags, one call each",
+            "compiler and flags, one call each, minimum processor times",
         ),
         Result(
             "wedge.single.realtime_factor",
-            run.duration / median(seconds["plain"]),
+            run.duration / min(seconds["plain"]),
             "1",
-            note="simulated time / wall time of a call from Python, including preparation",
+            note="simulated time / processor time of a call from Python, including preparation",
         ),
     ]
 
@@ -115,12 +115,12 @@ def ensemble(par: WedgeParameters) -> list[Result]:
         at_least(
             "wedge.ensemble.hand_c",
             least_ratio(seconds, "hand", "bywire"),
-            0.7 * width,
+            _PER_DOUBLE * width,
             "times faster",
             f"{CASES} variations of {len(VARIED)} parameters, three signals and no energies "
             "on both sides, relative to scalar C with the flags of a single run; minimum "
-            "processor times of one thread each, in turn; the goal is 0.7 times the vector "
-            f"width of {width} doubles",
+            "processor times of one thread each, in turn; the goal is 7.5 for vectors of eight "
+            f"doubles, in proportion to the width of {width} doubles",
         ),
     ]
 

@@ -12,15 +12,15 @@ _LINK = re.compile(r"\[([^\]]*)\]\((?!https?:|#)[^)]*\)")
 
 
 def benches_page() -> str:
-    """Return the page of all bench and study files with their full text."""
+    """Return the page of all bench, study and procedure files with their full text."""
     lines = [
-        "# Bench and study files",
+        "# Bench, study and procedure files",
         "",
-        "These files are in the repository's folders `benches/` and `studies/`. "
-        "[](../bench-files.md) and [](../studies.md) describe all keys.",
+        "These files are in the repository's folders `benches/`, `studies/` and `procedures/`. "
+        "[](../bench-files.md), [](../studies.md) and [](../procedures.md) describe all keys.",
         "",
     ]
-    for folder in ("benches", "studies"):
+    for folder in ("benches", "studies", "procedures"):
         for path in sorted((ROOT / folder).glob("*.toml")):
             text = path.read_text(encoding="utf-8").rstrip()
             lines += [f"## {plain(f'{folder}/{path.name}')}", "", "```toml", text, "```", ""]

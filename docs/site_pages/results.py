@@ -7,9 +7,9 @@ figures to show. Anything else that reads the page, such as a code host, sees an
     bywire run hard-braking --out results/braking
     ```
 
-The blocks of a page run in order, in one folder with a copy of the benches, studies and examples
-of the repository. A comment ``# exit status 1`` states a status that is not 0. A block with a
-caption is a file of that name.
+The blocks of a page run in order, in one folder with a copy of the benches, studies, procedures and
+examples of the repository. A comment ``# exit status 1`` states a status that is not 0. A block
+with a caption is a file of that name.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from site_pages import fork_server
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 COLUMNS = 110  # of the terminal
-FOLDERS = ("benches", "studies", "examples")
+FOLDERS = ("benches", "studies", "procedures", "examples")
 _BLOCK = re.compile(r"^```(?P<info>[^\n`]+)\n(?P<text>.*?)^```$", re.M | re.S)
 _CAPTION = re.compile(r"^:caption: (\S+)\n+", re.M)
 _START = "from bywire.cli.main import process; process()"

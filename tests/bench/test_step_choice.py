@@ -58,7 +58,7 @@ def test_the_choice_depends_only_on_the_bench(stated: Bench, chosen: Bench) -> N
 def test_the_steps_and_their_doubles_divide_the_sample_times() -> None:
     """Include sample times that are not whole microseconds."""
     bench = Bench("moment-pulses", error="1 %")
-    steps = list(permitted_steps(bench))
+    steps = list(permitted_steps([bench]))
     assert steps[0] == pytest.approx(100e-6)
     assert steps[-1] == pytest.approx(1e-6)
     for step in (*steps[:3], *(2.0 * each for each in steps[:3])):
@@ -90,6 +90,8 @@ def test_an_error_that_no_step_reaches(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"simulation.error": "0"}, ">= 0.0001 %"),
         ({"simulation.error": "1 bar"}, "wrong unit"),
         ({"error": "1 %"}, "it is a setting of the simulation"),
+        ({"simulation.error": "1%", "simulation.record": "7us"}, "recording intervals 0.007 ms"),
+        ({"simulation.error": "1%", "ecu.T_s": "0.33333ms"}, "multiples of each other"),
     ],
 )
 def test_errors_that_are_not_valid(changes: dict[str, str], match: str) -> None:

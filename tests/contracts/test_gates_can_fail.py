@@ -44,6 +44,7 @@ check_back_ends, check_jacobian = (
     element_contracts.has_agreeing_back_ends,
     element_contracts.has_its_slopes,
 )
+check_warnings = whole(element_contracts.warns_at_extremes)
 round_trip = parameters(element_contracts.survives_json)
 ranges = parameters(element_contracts.keeps_its_ranges)
 
@@ -74,6 +75,20 @@ MISTAKES = {
     "coefficient of a series": Mistake("plant/caliper", "3.0 * z / 8.0", "z / 8.0", check_energy),
     "sign of the gear loss": Mistake(
         "plant/ball_screw_gear", "(torque - par.J_mot", "(torque + par.J_mot", check_energy
+    ),
+    "warning between limits": Mistake(
+        "plant/pressure_sensor",
+        "outside(u.p, par.p_low, par.p_high)",
+        "~outside(u.p, par.p_low, par.p_high)",
+        check_warnings,
+        "row_by_row",
+    ),
+    "warning about a difference": Mistake(
+        "plant/motor_heat",
+        "x.T_winding > par.T_most",
+        "x.T_winding - x.T_housing > par.T_most",
+        check_warnings,
+        "row_by_row",
     ),
     "missing half": Mistake("plant/end_stop", "0.5 * par.k_stop", "par.k_stop", check_energy),
     "slip of one spring lost": Mistake(

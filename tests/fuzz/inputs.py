@@ -80,6 +80,7 @@ _NAMES = (
     "\x1b[31m",
     "options.duration",
     "simulation.step",
+    "simulation.error",
     "simulation.record",
     "simulation.seed",
     "requirements.overshoot",

@@ -60,6 +60,7 @@ _KEYS = (
     "options.duration",
     "options.settle",
     "simulation.step",
+    "simulation.error",
     "simulation.record",
     "motor.R_m",
     "simulation.seed",

@@ -125,6 +125,16 @@ def test_every_dependency_is_locked(lock):
     assert wanted - locked(lock) == set()
 
 
+def test_peers_of_the_benchmark_have_the_locked_versions():
+    lines = (ROOT / "benchmarks" / "requirements.txt").read_text(encoding="utf-8").splitlines()
+    pinned = {line.partition(" ")[0] for line in lines if not line.startswith("#")}
+    locked_too = re.findall(
+        r"^\S+==\S+", (ROOT / "requirements-dev.lock").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert len(pinned) > 3
+    assert pinned <= set(locked_too)
+
+
 def test_every_locked_package_has_hashes():
     for lock in ("requirements.lock", "requirements-dev.lock"):
         blocks = re.split(r"\n(?=[A-Za-z0-9])", (ROOT / lock).read_text(encoding="utf-8"))

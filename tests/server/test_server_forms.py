@@ -38,6 +38,15 @@ below_share = "80 %"
 lasting = "20 ms"
 """
 
+PROCEDURE = """
+procedure = "Stops"
+experiment = "straight-stop"
+v_max = "200 km/h"
+[[stops]]
+name = "cold"
+speed = "60 km/h"
+"""
+
 
 @pytest.fixture(scope="module")
 def folder(visit) -> None:
@@ -45,6 +54,7 @@ def folder(visit) -> None:
     (visit.folder / "small.toml").write_text(CAMPAIGN)
     (visit.folder / "wrong.toml").write_text(CAMPAIGN.replace('"motor.hot"', '"motor.hott"'))
     (visit.folder / "pads.toml").write_text('life = "wedge-pads"\n[vary]\n"stop.gap" = "+-5 %"\n')
+    (visit.folder / "stops.toml").write_text(PROCEDURE)
     (visit.folder / "aside").mkdir(exist_ok=True)
 
 
@@ -70,6 +80,8 @@ BAD = [
     ("life", {"life": "wedge-pads", "check": "-1"}, "check", "whole number >= 0"),
     ("life", {"life": "two-wheeler-pads", "check": "1"}, "check", "it must be 0 or >="),
     ("life", {"life": "wedge-pads", "set": "wear.x=1"}, "set", "unknown"),
+    ("procedure", {"procedure": "stops.toml"}, "procedure", "has no limit"),
+    ("procedure", {"procedure": "pads.toml"}, "procedure", "bywire life"),
     ("compare", {"runs": "curve.toml"}, "runs", "at least two"),
     ("compare", {"runs": "curve.toml\naside"}, "runs", "not a complete result"),
     ("compare", {"runs": "curve.toml\nseal-stribek"}, "runs", "seal-stribeck"),
@@ -132,6 +144,7 @@ def test_what_does_not_fit_stands_beside_its_field(visit, task, given, field, te
     [
         ("faults", "campaign"),
         ("life", "life"),
+        ("procedure", "procedure"),
         ("compare", "runs"),
         ("run", "bench"),
         ("identify", "map"),

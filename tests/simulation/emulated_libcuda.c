@@ -1,8 +1,9 @@
 /* A driver's library, libcuda.so.1, that NVIDIA's bindings load and call: its memory is this
- * machine's, and its kernel the library of EMULATED_KERNEL. */
+ * machine's, and its kernels the libraries in the folder EMULATED_KERNELS, by their names. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -63,11 +64,14 @@ static int fake_cuMemcpy2D(const struct lines *copied) {
 }
 static int fake_cuModuleLoadData(void **module, const void *image) {
   if (memcmp(image, "\177ELF", 4)) return INVALID_IMAGE;
-  *module = dlopen(getenv("EMULATED_KERNEL"), RTLD_NOW);
-  return *module ? 0 : INVALID_IMAGE;
+  *module = context;
+  return 0;
 }
 static int fake_cuModuleGetFunction(void **function, void *module, const char *name) {
-  *function = strcmp(name, "bw_run_cases") ? NULL : dlsym(module, "emulated");
+  char path[4096];
+  snprintf(path, sizeof(path), "%s/%s", getenv("EMULATED_KERNELS"), name);
+  void *const library = module == context ? dlopen(path, RTLD_NOW) : NULL;
+  *function = library ? dlsym(library, "emulated") : NULL;
   return *function ? 0 : NOT_FOUND;
 }
 static int fake_cuLaunchKernel(void *function, unsigned blocks, unsigned by, unsigned bz,

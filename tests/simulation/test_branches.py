@@ -8,12 +8,13 @@ from typing import cast
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
-from bywire.simulation.branches import Arm, branch, branched
+from bywire.simulation.branches import Arm, branch, branched, modes
 from bywire.simulation.emit_lanes import emit_lanes
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph
 from bywire.simulation.program import build_program
-from bywire.simulation.stages import build_stages
+from bywire.simulation.quadrature import Levels
+from bywire.simulation.stages import LEVEL, build_stages
 
 
 def selection() -> tuple[Graph, dict[str, int]]:
@@ -93,3 +94,21 @@ def test_lanes_compute_a_costly_arm_only_if_a_lane_selects_it() -> None:
     powers = re.findall(r"(\S.*)\n\s+const V v\d+ = MAX\(.*\n\s+const V v\d+ = POW\(", text)
     assert len(powers) == 2  # one friction curve for each motor
     assert all(re.fullmatch(r"if \(ANY\(if_v\d+\)\) \{", line) for line in powers)
+
+
+def test_long_functions_come_first_with_the_selections_that_skip_them() -> None:
+    graph = Graph()
+    x, y = graph.leaf("x", 0), graph.leaf("x", 1)
+    short = graph.apply("mul", graph.apply("add", x, y), y)
+    sine = graph.apply("sin", graph.apply("mul", x, x))
+    late = short
+    for _ in range(30):  # needs too many operations to come early
+        late = graph.apply("add", graph.apply("mul", late, x), y)
+    late = graph.apply("exp", late)
+    skipped = graph.apply("if_else_zero", graph.apply("lt", y, x), graph.apply("mul", sine, y))
+    root = graph.apply("add", graph.apply("add", short, late), skipped)
+    order = modes(graph, [root], Levels(graph, LEVEL)).rest
+    place = {node: k for k, node in enumerate(order)}
+    assert all(place[a] < place[n] for n in order for a in graph.arguments(n) if a in place)
+    assert place[sine] < place[skipped] < place[late] < place[root]
+    assert place[skipped] < len(order) - 40

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bywire.core.errors import DeviceError, ParameterError
+from bywire.simulation import cuda_device
 from bywire.simulation.cuda_device import find_device
 from emulated_driver import EmulatedDriver, Status, emulated
 from raising import raises
@@ -123,6 +124,32 @@ def test_memory_that_cannot_be_locked_is_ordinary_memory(driver, monkeypatch):
     monkeypatch.setattr(driver, "cuMemHostAlloc", failing(Status.CUDA_ERROR_LAUNCH_FAILED))
     with raises(DeviceError, name="emulated 0", value="CUDA_ERROR_LAUNCH_FAILED"):
         find_device().host_array((3, 2))
+
+
+def test_memory_of_earlier_arrays_is_used_again(driver):
+    device = find_device()
+    first = [device.host_array((k, 1000)).ctypes.data for k in (1, 4, 16)]
+    again = [device.host_array((k, 1000)).ctypes.data for k in (16, 4, 1)]
+    assert again == first[::-1]
+    for k in range(30):
+        assert device.host_array((1, 10 * 3**k % 9973 + 1)).shape
+    assert len(driver.locked) <= 9
+
+
+def test_a_process_of_a_study_waits_for_memory_of_the_others(driver, monkeypatch):
+    monkeypatch.setattr(cuda_device, "parent_process", lambda: "the study")
+    monkeypatch.setattr(cuda_device, "_POLLED", 0.0)
+    device, plain, answers = find_device(), driver.cuMemAlloc, [Status.CUDA_ERROR_OUT_OF_MEMORY] * 3
+    monkeypatch.setattr(
+        driver, "cuMemAlloc", lambda size: (answers.pop(), None) if answers else plain(size)
+    )
+    with device.working() as memory:
+        assert memory.room(100)
+    assert not answers
+    monkeypatch.setattr(cuda_device, "_PATIENCE", 0.01)
+    driver.capacity = 50
+    with raises(DeviceError, name="emulated 0", value="MB"), device.working() as memory:
+        memory.room(100)
 
 
 def test_numbers_come_into_an_array_at_any_distances(driver):

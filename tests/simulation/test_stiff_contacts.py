@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bywire.simulation import contacts
 from bywire.simulation.contacts import unresolved
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run
@@ -40,3 +41,19 @@ def test_many_runs_are_doubted_as_each_alone(runs: list[Run]) -> None:
     assert expected[0] == ""
     assert "too fast for steps of 20 us" in expected[-1]
     assert len(set(expected[1:])) == len(expected[1:])
+
+
+def test_disks_rule_out_only_steps_that_no_mode_makes_too_long():
+    random, count = np.random.default_rng(5), 200
+    like = random.normal(size=(6, 6)) * 1e4
+    closed = (
+        like + random.normal(size=(count, 6, 6)) * np.geomspace(1e-3, 3e3, count)[:, None, None]
+    )
+    opened = np.zeros_like(closed)
+    excluded = 0
+    for step in np.geomspace(1e-6, 1e-3, 30):
+        ruled_out = contacts._are_surely_resolved(closed, step)
+        texts = contacts._too_fast(opened, closed, step)
+        assert not any(text for text, is_out in zip(texts, ruled_out, strict=True) if is_out)
+        excluded += np.count_nonzero(ruled_out)
+    assert 0 < excluded < 30 * count

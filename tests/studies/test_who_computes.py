@@ -15,7 +15,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bywire.bench.ensemble import numbers_per_case
 from bywire.core.errors import FileError, ParameterError, RunError
+from bywire.studies import executor
 from bywire.studies.executor import (
     CLUSTER_MEMORY,
     CLUSTER_SETTINGS,
@@ -24,6 +26,7 @@ from bywire.studies.executor import (
     Pool,
     executor_of,
 )
+from bywire.studies.plan import CHUNK
 from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 from raising import raises
@@ -142,6 +145,36 @@ def test_who_computes_is_chosen_by_the_work(monkeypatch):
     alone, shared = (executor_of(n, "", 1000, engine="cuda") for n in (1, 3))
     assert isinstance(alone, InProcess)
     assert isinstance(shared, Pool)
-    assert alone.together == shared.together > 1
+    assert (alone.together, shared.together) == (500, 334)  # as few rounds as possible
+    monkeypatch.setattr("os.cpu_count", lambda: 16)
+    few, some, many = (executor_of(None, "", n, engine="cuda") for n in (63, 157, 3125))
+    assert isinstance(few, InProcess)
+    assert few.together == 63
+    assert (some.workers, some.together) == (4, 40)  # a launch of few cases takes as long
+    assert (many.workers, many.together) == (16, 196)
     with raises(ParameterError, name="cluster"):
         executor_of(None, "tcp://host:8786", 1000, engine="cuda")
+
+
+def test_a_batch_for_a_graphics_processor_fits_into_this_machines_memory(study, monkeypatch):
+    plan = read_study(study())
+    size = 8 * CHUNK * numbers_per_case(plan.bench)
+    rows = 51  # of 10 ms of settling and 40 ms, 12 signals or more, and the stimulus twice
+    assert size > 8 * CHUNK * rows * (12 + 2)
+    monkeypatch.setattr(executor, "machine_memory", lambda: 12.5 * size)
+    assert [executor._fitting(plan, 100, workers) for workers in (1, 2, 20)] == [6, 3, 1]
+    assert executor._fitting(plan, 2, 1) == 2
+    assert executor._fitting(plan, 7, 1) == 4  # and then 3, instead of 6 and 1
+
+
+def test_tasks_grow_to_their_target_and_shrink_towards_the_end():
+    tasks, sizes = executor._Tasks(range(40), workers=2, seconds=0.2, most=4), []
+    while task := tasks.next():
+        sizes.append(len(task))
+        tasks.measured((0.08 * len(task), [(n, {}) for n in task]))  # 0.08 s for each chunk
+    assert sizes[:4] == [1, 2, 2, 2]
+    assert sizes[-3:] == [1, 1, 1]
+    assert sum(sizes) == 40
+    quick = executor._Tasks(range(40), workers=1, seconds=0.2, most=4)
+    quick.measured((1e-3, [(0, {})]))
+    assert len(quick.next()) == 4

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
+from bywire.core.errors import counted
 from bywire.core.units import difference_unit, unit_text
 from bywire.procedures.procedure_file import StopPlan
 from bywire.procedures.sequence import NOT_SHOWN, NotShown, Procedure, Stop
@@ -98,7 +99,9 @@ class ProcedureResult(Answer):
     def document(self) -> Document:
         """Return the stops, the limits with their verdicts, and the numbers with their sources."""
         plan = self.procedure.plan
-        subject = Subject.of_bench(plan.bench, plan.name, plan.title)
+        count = sum(stop.count for stop in self.stops)
+        summary = f"{counted(count, 'stop')} of {plan.bench.system} ({plan.bench.experiment})"
+        subject = Subject.of_bench(plan.bench, plan.name, summary)
         stops, limits = TableBlock(self._stops()), TableBlock(self._limits())
         warned = [Listing([f"Warning: {text}." for text in self.warnings])] if self.warnings else []
         absent = [Listing(plan.missing, "The procedure leaves out:")] if plan.missing else []
@@ -156,23 +159,28 @@ class ProcedureResult(Answer):
 
     def _stops(self) -> Table:
         figures = self.procedure.plan.demand_figures.units
-        shown = [
+        columns = [
             (name, heading)
-            for name, heading in (*_COLUMNS, *((name, name) for name in figures))
+            for name, heading in (
+                *_COLUMNS,
+                *((name, name.replace("_", " ", 1)) for name in figures),
+            )
             if any((kpi := stop.kpi(name)) and math.isfinite(kpi.value) for stop in self.stops)
         ]
-        heading = ["stop", "number", "speed", *(each for _, each in shown), "paragraph"]
+        heading = ["stop", "number", "speed", "conditions", *(each for _, each in columns)]
         rows = [
             (
                 stop.plan.name,
                 _numbered(stop),
                 _speed_cell(stop.plan),
-                *(_kpi_cell(stop, name) for name, _ in shown),
-                stop.plan.source or "-",
+                _conditions(stop) or "-",
+                *(_kpi_cell(stop, name) for name, _ in columns),
             )
             for stop in self.stops
         ]
-        return text_table(heading, rows)
+        table = text_table(heading, rows)
+        marked = [replace(c, is_detail=c.heading == "conditions") for c in table.columns]
+        return replace(table, columns=tuple(marked))
 
     def _limits(self) -> Table:
         heading = ("stop", "number", "figure", "value", "limit", "margin", "verdict", "paragraph")
@@ -296,6 +304,21 @@ def _speed_cell(plan: StopPlan) -> Cell:
     return Cell(f"{text} {unit_text('km/h')}")
 
 
+def _conditions(stop: Stop) -> str:
+    """Return the conditions of a stop in addition to its speed."""
+    plan = stop.plan
+    if plan.bench is None:
+        return f"missing: {', '.join(plan.lacking)}"
+    texts = [f"{name} = {value}" for name, value in plan.changes]
+    if plan.T_brake is not None and (stop.first == 1 or plan.interval is None):
+        texts.insert(0, f"discs at {amount(plan.T_brake, 'K')}")
+    elif plan.interval is not None and stop.begin > 0.0:
+        texts.insert(0, f"{amount(plan.interval, 's')} after the previous start")
+    if plan.deceleration is not None:
+        texts.append(f"adjusted to {amount(plan.deceleration, 'm/s**2')}")
+    return ", ".join(texts)
+
+
 def _kpi_cell(stop: Stop, name: str) -> Cell:
     kpi, is_partial = stop.kpi(name), stop.plan.until > 0.0
     if kpi is None or not math.isfinite(kpi.value) or (is_partial and name in _OF_STANDSTILL):
@@ -326,6 +349,7 @@ def _stop_record(stop: Stop) -> dict[str, Any]:
         "interval": plan.interval,
         "T_brake": plan.T_brake,
         "deceleration": plan.deceleration,
+        "changes": dict(plan.changes),
     }
     return {
         "name": plan.name,

@@ -25,7 +25,7 @@ from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
-from bywire.bench.step_choice import with_chosen_step
+from bywire.bench.step_choice import exceeded, with_chosen_step
 from bywire.core.arguments import require_kinds
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Progress
@@ -148,7 +148,7 @@ class BenchResult(Result, Answer):
     @property
     def warnings(self) -> list[str]:
         """Warnings about the bench and its runs."""
-        return [*self.bench.outdated, *super().warnings]
+        return [*self.bench.outdated, *super().warnings, *filter(None, [exceeded(self)])]
 
     @property
     def rows(self) -> list[KpiRow]:
@@ -354,7 +354,7 @@ def run_once(
     bench: Bench, progress: Progress | None, engine: str, estimate_error: bool, animated: bool
 ) -> BenchResult:
     """Return the result of a bench (see `bywire.run`)."""
-    bench = with_chosen_step(bench, progress=progress)
+    bench = with_chosen_step(bench, progress=progress, engine=engine)
     result = running.run(bench, progress, engine, estimate_error)
     return BenchResult(
         **{each.name: getattr(result, each.name) for each in fields(result)}, animated=animated

@@ -354,7 +354,7 @@ def run_over(
     """
     name, unit, values = range_of_bench(bench, over)
     cases = [{name: value} for value in values]
-    bench = with_chosen_step(bench, spread_over(cases), progress)
+    bench = with_chosen_step(bench, spread_over(cases), progress, engine)
     benches = [changed(bench, case) for case in cases]
     results = run_benches(benches, progress, engine, estimate_error=estimate_error)
     return BenchRange(bench, name, unit, tuple(values), results)

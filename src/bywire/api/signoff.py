@@ -192,10 +192,7 @@ class SignOff(Answer):
             missing = tuple(Judged("not shown", text, note=why) for text in texts)
             return Shown(evidence, None, missing)
         if not evidence.limits:
-            note = kept.summary
-            if kept.outcome == "not shown":
-                note = "no limit: add one to the evidence or to its bench"
-            return Shown(evidence, kept, (Judged(kept.outcome, note=note),))
+            return Shown(evidence, kept, (Judged(kept.outcome, note=kept.summary),))
         judged = tuple(
             kept.judged.get(str(limit)) or judge_limit(limit, kept.figures)
             for limit in evidence.limits

@@ -24,6 +24,7 @@ from bywire.bench.experiment import (
     checked_interval,
     checked_step,
     error_text,
+    longest_choice,
     two_steps,
 )
 from bywire.bench.faults.fault_section import Injection, injections
@@ -52,7 +53,6 @@ from bywire.core.units import shown
 from bywire.core.values import parsed
 from bywire.simulation.engine import engine_names, structure_of
 from bywire.simulation.run import Run
-from bywire.simulation.schedule import longest_step
 
 _SHARE = 1e-3  # relative change that tests whether a value has an effect
 
@@ -373,7 +373,7 @@ class Bench:
     def _aligned(self, case: Case) -> Case:
         """Return a case aligned for its step, or for the longest one if none is chosen yet."""
         if math.isnan(self.step):
-            return case.aligned(longest_step(case.intervals(self.record)), self.record)
+            return case.aligned(longest_choice(case.intervals(self.record)), self.record)
         return case.aligned(self.step, self.record)
 
     @cached_property

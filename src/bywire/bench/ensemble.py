@@ -569,6 +569,22 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
     return KeyFigures(figures, tuple(map(tuple, warnings)))
 
 
+def numbers_per_case(bench: Bench) -> int:
+    """Return how many numbers the stimulus and the rows of a case of `key_figures_of` have.
+
+    The stimulus counts twice, because a graphics processor receives a copy of it.
+    """
+    judge, run = bench.definition.judge, next(iter(bench.runs().values()), None)
+    wanted: Wanted | None = None
+    if run is None:
+        return 1
+    if isinstance(judge, FamilyJudge) and is_plain(bench):
+        wanted = needed(judge.signals([bench.chosen_options]), run)
+    schedule, every = run.schedule(), run.model.Output._fields
+    signals = len(every if wanted is None else wanted.signals)
+    return schedule.rows * signals + 2 * schedule.stimulus_rows * len(run.model.Stimulus._fields)
+
+
 def needed(wanted: set[str], run: Run) -> Wanted | None:
     """Return the outputs that key figures, warnings and energy balances read; None for all."""
     watched, names = run.model.watched(run.par), run.model.Output._fields

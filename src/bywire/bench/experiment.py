@@ -28,7 +28,7 @@ from bywire.core.units import convert, shown, unit_text
 from bywire.simulation.advance import Change
 from bywire.simulation.noise import Noise, put_noise
 from bywire.simulation.run import Run
-from bywire.simulation.schedule import plan
+from bywire.simulation.schedule import longest_step, plan
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -434,6 +434,8 @@ LARGEST_ERROR = 0.1
 """largest numerical error that a bench may state"""
 SMALLEST_ERROR = 1e-6
 """smallest numerical error that a bench may state"""
+FINEST = 1e-6
+"""shortest substep [s] that bywire chooses; a run with it takes 20 times as long as usual"""
 LARGEST_SEED = 2**63 - 1
 """maximum seed that a recording's file can store"""
 
@@ -463,6 +465,32 @@ def checked_error(value: Any) -> float | None:
     written = quoted(text) if text else f"{error:g}"
     valid = f">= {error_text(SMALLEST_ERROR)} and <= {error_text(LARGEST_ERROR)}"
     raise not_valid("simulation.error", written, valid, 'for example, "0.1 %"', StepError)
+
+
+def longest_choice(intervals: Collection[float]) -> float:
+    """Return twice the longest step [s] that bywire may choose.
+
+    Parameters
+    ----------
+    intervals
+        All sample times and recording intervals [s], which steps and their doubles divide.
+
+    Raises
+    ------
+    StepError
+        When the intervals permit only steps below `FINEST`.
+    """
+    longest = longest_step(intervals)
+    if longest >= 2.0 * FINEST:
+        return longest
+    texts = ", ".join(shown(each, "s", digits=9) for each in sorted(set(intervals)))
+    raise StepError(
+        f"simulation.error is not possible with the sample times and recording intervals {texts}, "
+        f"because bywire does not choose steps below {shown(FINEST, 's', 'us')}. Choose multiples "
+        f"of each other, or type {option('overrides', {'simulation.step': '20us'})}",
+        name="simulation.error",
+        valid="simulation.step",
+    )
 
 
 def two_steps(step: str, error: str) -> StepError:

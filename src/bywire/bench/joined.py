@@ -17,7 +17,7 @@ from bywire.core.errors import BywireError
 from bywire.core.parameters import ParameterSet
 from bywire.core.several import DifferError, Several
 from bywire.core.typing import Array
-from bywire.simulation.run import Run, sampled_stimulus
+from bywire.simulation.run import Run, put_signals, sampled_stimulus
 from bywire.simulation.run_table import RunTable
 
 _LEAST = 4  # cases: the first and the last one are also set up alone
@@ -151,6 +151,7 @@ def join(
         ends = {k: build(k) for k in (0, len(seeds) - 1)}
         runs = {k: _run(each) for k, each in ends.items()}
         table = _table(case, seeds, runs[0], lambda k: runs[k] if k in runs else _run(build(k)))
+        sampled_stimulus(runs[0], runs[0].schedule())  # rejects invalid values
         for k, run in runs.items():
             _require_equal(case, ends[k].cases()[0], run, table, k)
     except DifferError:
@@ -208,13 +209,13 @@ def _require_equal(case: Case, alone: Case, run: Run, table: RunTable, k: int) -
     DifferError
         When they differ.
     """
-    rows = sampled_stimulus(run, run.schedule())
-    quiet = [j for j in range(rows.shape[1]) if j not in table.noisy]
+    rows = np.zeros(table.stimulus.shape)
+    put_signals(rows, run, run.schedule().stimulus_times)
     pairs = (
         (table.parameters[k], list(run.par.leaves().values())),
         (table.states[k], run.state),
         (table.memories[k], run.memory),
-        (table.stimulus[:, quiet], rows[:, quiet]),
+        (table.stimulus, rows),
     )
     is_equal = (
         type(case) is type(alone) is Case

@@ -376,15 +376,16 @@ class Rows:
         values = None if self.held is None else self.held.extremes(name)
         return None if values is None or not np.isfinite(values).all() else values
 
-    def outlined(self) -> Rows | None:
-        """Return rows with the first, lowest, highest and last value of each signal.
-
-        None for rows that a graphics processor does not hold.
-        """
-        if self.held is None:
-            return None
+    def outlined(self) -> Rows:
+        """Return rows with the first, lowest, highest and last value of each signal."""
         time = self._values[TIME][[0, 0, -1, -1]]
-        return Rows(time, OnDemand(self._signals, self.held.extremes), self._attributes)
+        found = self._extremes if self.held is None else self.held.extremes
+        return Rows(time, OnDemand(self._signals, found), self._attributes)
+
+    def _extremes(self, name: str) -> Array:
+        y = self._values[name]
+        each = (y[..., 0], y.min(axis=-1), y.max(axis=-1), y[..., -1])
+        return np.stack(each, axis=-1)
 
     def unit(self, name: str) -> str:
         """Return the SI unit of a signal; ``"1"`` if none is recorded."""

@@ -5,26 +5,25 @@ with each of them as `bywire.bench.step_error` does. The error of a figure is re
 magnitude, or to the maximum of the signals from which it is computed, if that is larger. A small
 difference of large signals, such as a steady-state error, is therefore judged like the signals.
 
-The choice depends only on the benches, and not on the machine or the engine.
+The choice is a function of the benches: the same bench always has the same step.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench import running
 from bywire.bench.bench import Bench, StepChoice
 from bywire.bench.ensemble import changed, key_figures_of
-from bywire.bench.experiment import LARGEST_ERROR, error_text
+from bywire.bench.experiment import FINEST, LARGEST_ERROR, error_text, longest_choice
 from bywire.bench.kpis.families import FAMILIES, FamilyJudge, signals_of_setting
 from bywire.bench.kpis.kpi import BOUND
 from bywire.bench.running import Result
@@ -34,10 +33,10 @@ from bywire.core.errors import BywireError, DeviceError, InputError, RunError, S
 from bywire.core.typing import Array, Progress
 from bywire.core.units import shown
 from bywire.simulation.run_table import doubts_of
-from bywire.simulation.schedule import longest_step
 
-FINEST = 1e-6
-"""shortest step [s] that bywire chooses; a run with it takes 20 times as long as usual"""
+if TYPE_CHECKING:
+    import xarray as xr
+
 _PERCENT = 100.0
 _COUNTS = sorted(2**a * 5**b for a in range(1, 24) for b in range(10))
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -49,6 +48,7 @@ def with_chosen_step(
     bench: Bench,
     variations: Sequence[Mapping[str, Any]] = (),
     progress: Progress | None = None,
+    engine: str = "auto",
 ) -> Bench:
     """Return a bench with the longest step that meets its stated error.
 
@@ -64,6 +64,8 @@ def with_chosen_step(
         experiment rejects, or that fail with every step, do not count.
     progress
         Called with a label and the finished fraction, 0 to 1.
+    engine
+        Engine of the runs; ``auto`` uses the bench's engine.
 
     Raises
     ------
@@ -74,13 +76,14 @@ def with_chosen_step(
     """
     if bench.error is None or bench.choice is not None:
         return bench
-    return replace(bench, **_chosen(_Trials(bench, variations), progress))
+    tried = bench if engine == "auto" else replace(bench, engine=engine)
+    return replace(bench, **_chosen(_Trials(tried, variations), progress))
 
 
 def _chosen(trials: _Trials, progress: Progress | None) -> dict[str, Any]:
     """Return the chosen step as fields of a bench."""
     stated = float(trials.bench.error or 0.0)
-    steps = list(permitted_steps(trials.bench))
+    steps = list(permitted_steps(trials.benches))
     tried: list[_Trial] = []
     failure: RunError | None = None
     longest = math.inf
@@ -125,22 +128,20 @@ def exceeded(result: Result) -> str:
     if bench.choice is None or not result.recordings:
         return ""
     scales, intervals = scales_of(bench, result.recordings), _intervals(bench)
-    errors = {}
+    texts = []
     for kpi in result.kpis:
         scale = max(abs(kpi.value), scales.full.get(kpi.name, 0.0))
-        if kpi.name in (bench.limits or [kpi.name]) and scale > 0.0 and not math.isnan(kpi.error):
-            read = reading_error(kpi.value, intervals) if kpi.unit == "s" else 0.0
-            factor = 1.0 if kpi.converges else BOUND
-            errors[kpi.name] = factor * max(kpi.error - read, 0.0) / scale
-    return _exceeded(bench.choice.stated, errors)
-
-
-def _exceeded(stated: float, errors: Mapping[str, float]) -> str:
-    large = [name for name, error in errors.items() if error > stated]
-    if not large:
+        if kpi.name not in (bench.limits or [kpi.name]) or not scale > 0.0:
+            continue
+        beside = scales.rounding.get(kpi.unit, 0.0)
+        beside += reading_error(kpi.value, intervals) if kpi.unit == "s" else 0.0
+        error = (1.0 if kpi.converges else BOUND) * max(kpi.error - beside, 0.0) / scale
+        if error > bench.choice.stated * (1.0 + error):  # the choice also scales with other steps
+            texts.append(f"{kpi.name} {percent_text(error)}")
+    if not texts:
         return ""
-    texts = ", ".join(f"{name} {percent_text(errors[name])}" for name in large)
-    return f"numerical errors exceed simulation.error = {error_text(stated)}: {texts}"
+    stated = error_text(bench.choice.stated)
+    return f"numerical errors exceed simulation.error = {stated}: {', '.join(texts)}"
 
 
 def percent_text(error: float) -> str:
@@ -152,19 +153,20 @@ def _intervals(bench: Bench) -> set[float]:
     return {case.record for case in bench.cases()}
 
 
-def permitted_steps(bench: Bench) -> Iterator[float]:
-    """Yield the steps [s] that bywire may choose for a bench, the longest one first.
+def permitted_steps(benches: Iterable[Bench]) -> Iterator[float]:
+    """Yield the steps [s] that bywire may choose for several benches, the longest one first.
 
     They and their doubles divide all sample times and recording intervals, and have few digits.
     """
-    intervals = {each for case in bench.cases() for each in case.intervals(bench.record)}
+    runs = [(bench, case) for bench in benches for case in bench.cases()]
+    intervals = {each for bench, case in runs for each in case.intervals(bench.record)}
     if not intervals:  # a static characteristic, without runs
         yield Bench.step
         return
-    longest = longest_step(sorted(intervals))
+    longest = longest_choice(intervals)
     for count in _COUNTS:
         step = float(f"{longest / count:.12g}")
-        if step < FINEST and count > _COUNTS[0]:
+        if step < FINEST:
             return
         yield step
 
@@ -364,18 +366,22 @@ class _Trials:
 
     def __init__(self, bench: Bench, variations: Sequence[Mapping[str, Any]]) -> None:
         self.bench = bench
-        self._variations = [each for each in variations if _is_valid(bench, each)]
+        made = [(each, _changed(bench, each)) for each in variations]
+        self._variations = [each for each, varied in made if varied is not None]
+        self.benches = [bench, *(varied for _, varied in made if varied is not None)]
         self._known: dict[float, Figures] = {}
 
     @property
     def count(self) -> int:
         """Number of benches."""
-        return 1 + len(self._variations)
+        return len(self.benches)
 
     def confirmed(self, step: float, stated: float) -> _Trial:
-        """Return the errors with a step, or with half of it if these are larger than stated.
+        """Return the errors with a step, confirmed with half of it if they are as small as stated.
 
-        A figure whose values scatter may meet the error by chance, but seldom with both steps.
+        A figure whose values scatter may meet the error by chance, and may appear to converge. If a
+        figure does not converge with one of both steps, its error is at least the root mean square
+        of both errors.
 
         Raises
         ------
@@ -383,11 +389,17 @@ class _Trials:
             When the bench itself fails with this step, or with a shorter one.
         """
         trial = self.at(step)
-        is_met = not trial.doubt and trial.errors.reached <= stated
-        if is_met and trial.errors.scattered and _HALF * step >= FINEST:
-            half = self.at(_HALF * step)
-            return trial if half.errors.reached <= stated else half
-        return trial
+        errors = trial.errors
+        if trial.doubt or errors.reached > stated:
+            return trial
+        half = self.at(_HALF * step).errors
+        if not half.each:
+            return trial
+        each, scattered = dict(errors.each), errors.scattered | half.scattered
+        for name in scattered:
+            square = 0.5 * (errors.each[name] ** 2 + half.each[name] ** 2)
+            each[name] = np.fmax(errors.each[name], np.sqrt(square))
+        return _Trial(step, Errors(each, scattered))
 
     def at(self, step: float) -> _Trial:
         """Return the errors with a step.
@@ -398,7 +410,8 @@ class _Trials:
             When the bench itself fails with this step, or with a shorter one.
         """
         bench = _with_step(self.bench, step)
-        doubts = (text for run in bench.runs().values() for text in doubts_of([run]))
+        runs = (run for each in self._with(step) if each for run in each.runs().values())
+        doubts = (text for run in runs for text in doubts_of([run]))
         if doubt := next(filter(None, doubts), ""):
             return _Trial(step, Errors({}, frozenset()), doubt)
         here = self._figures(step)
@@ -419,33 +432,39 @@ class _Trials:
 
     def _figures(self, step: float) -> Figures:
         if step not in self._known:
-            bench = _with_step(self.bench, step)
-            benches = [bench, *(changed(bench, each) for each in self._variations)]
-            self._known[step] = figures_of(benches)
+            self._known[step] = figures_of(self._with(step))
         return self._known[step]
 
+    def _with(self, step: float) -> list[Bench | None]:
+        bench = _with_step(self.bench, step)
+        return [bench, *(_changed(bench, each) for each in self._variations)]
 
-def figures_of(benches: Sequence[Bench]) -> Figures:
-    """Return the key figures of benches of one experiment.
+
+def figures_of(benches: Sequence[Bench | None]) -> Figures:
+    """Return the key figures of benches of one experiment; None for a bench that is not valid.
 
     Raises
     ------
     RunError
         When the first bench fails. The figures of another one that fails are not defined.
     """
-    names = benches[0].definition.kpis_with(benches[0].chosen_options)
+    first = benches[0]
+    assert first is not None
+    names = first.definition.kpis_with(first.chosen_options)
     values = {name: np.full(len(benches), math.nan) for name in names}
-    failed = np.zeros(len(benches), dtype=bool)
+    failed = np.ones(len(benches), dtype=bool)
     warnings: list[str] = []
     groups: dict[str, list[int]] = {}
     for k, bench in enumerate(benches):
+        if bench is None:
+            continue
         choices = bench.par.choices(), bench.chosen_options.choices()
         groups.setdefault(str(choices), []).append(k)
     pending = list(groups.values())
     while pending:
         group = pending.pop()
         try:
-            made = key_figures_of([benches[k] for k in group])
+            made = key_figures_of([each for k in group if (each := benches[k]) is not None])
         except DeviceError:
             raise
         except BywireError:
@@ -453,7 +472,6 @@ def figures_of(benches: Sequence[Bench]) -> Figures:
                 raise
             if len(group) > 1:  # a single bench may rule out a joint run
                 pending += [[k] for k in group]
-            failed[group] = True
             continue
         failed[group] = False
         for figure in made.figures:
@@ -467,12 +485,12 @@ def _with_step(bench: Bench, step: float) -> Bench:
     return replace(bench, step=step, error=None, choice=None)
 
 
-def _is_valid(bench: Bench, variation: Mapping[str, Any]) -> bool:
+def _changed(bench: Bench, variation: Mapping[str, Any]) -> Bench | None:
+    """Return a bench with other parameters and options; None if it is not valid."""
     try:
-        changed(bench, variation)
+        return changed(bench, variation)
     except InputError:
-        return False
-    return True
+        return None
 
 
 def _masked(text: str) -> str:

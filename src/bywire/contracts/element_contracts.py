@@ -44,6 +44,7 @@ from bywire.core.typing import Array
 NODES = 4  # number of nodes of every table
 ATTEMPTS = 2000
 _SHOWN = 24  # values in a message
+_ROWS = 6  # of signals that an element watches
 MANY = 64
 """maximum number of combinations of choices for which all combinations are tested"""
 
@@ -616,6 +617,49 @@ def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
         )
 
 
+def warns_at_extremes(module: ModuleType) -> Iterator[Evidence]:
+    """Check that the lowest and highest values of inputs determine whether an element warns.
+
+    Studies on a graphics processor rely on this for a ``watch`` that is declared `within_limits`.
+    """
+    watch, rng = module.watch, np.random.default_rng(2010)
+    annotations, _ = signature_of(watch)
+    texts = {name: "here" for name, note in annotations.items() if note is str}
+    annotations = {n: note for n, note in annotations.items() if n != "t" and n not in texts}
+    signals = [name for name, note in annotations.items() if not is_parameters(note)]
+    for choices in combinations(annotations):
+        sampler = Sampler(annotations, choices)
+        for _ in range(SAMPLES):
+            sample = sampler.sample() | texts
+            rows = {name: _spread(rng, flat(sample[name])) for name in signals}
+            ends = {name: np.sort(each, axis=1)[:, [0, -1]] for name, each in rows.items()}
+            every, two = (
+                watch(t=np.arange(float(n)), **_filled(sample, given))
+                for n, given in ((_ROWS, rows), (2, ends))
+            )
+            text = "a warning about some rows depends on more than their lowest and highest values"
+            yield Evidence(
+                bool(every) == bool(two),
+                f"{text}. Declare watch as row_by_row instead{described(choices)}",
+                place=place_of(watch),
+            )
+
+
+def _spread(rng: np.random.Generator, values: Sequence[float]) -> Array:
+    """Return rows around values, over several orders of magnitude and of both signs."""
+    shape = len(values), _ROWS
+    scale = 10.0 ** rng.uniform(-2.0, 4.0, shape) * np.array(values)[:, None]
+    return np.asarray(scale * rng.uniform(-1.0, 1.0, shape))
+
+
+def _filled(sample: Arguments, rows: Mapping[str, Array]) -> Arguments:
+    """Return arguments whose signals have rows, shape (numbers, rows) each."""
+    return sample | {
+        name: type(sample[name])(*each) if isinstance(sample[name], tuple) else each[0]
+        for name, each in rows.items()
+    }
+
+
 def _consistent(module: ModuleType, known: dict[str, Any], sample: Arguments) -> Arguments:
     """Return the arguments, with those that the element's own laws determine replaced."""
     computed: Arguments = {}
@@ -701,6 +745,8 @@ def demands_on(element: Element) -> Demands:
         yield Demand("energy balance", element.name, module, keeps_energy)
     if "power_loss" in functions:
         yield Demand("loss", element.name, module, loses_what_it_says)
+    if hasattr(getattr(module, "watch", None), "within_limits"):
+        yield Demand("warnings", element.name, module, warns_at_extremes)
     for cls in parameter_classes(module):
         for contract, test in OF_A_CLASS.items():
             yield Demand(contract, f"{element.name}.{cls.__name__}", cls, test)

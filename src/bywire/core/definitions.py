@@ -82,6 +82,7 @@ class _Reached:
         self._rooms, self._named, self._with_equations = rooms, named, with_equations
         self._seen: dict[int, Any] = {}  # keeps the objects alive, so that addresses stay unique
         self._seen_collections: set[tuple[str, str]] = set()
+        self._seen_texts: set[str] = set()
         self._sources: dict[str, _Source] = {}
 
     def visit(self, value: Any, name: str = "") -> _Steps:
@@ -121,6 +122,9 @@ class _Reached:
             self.pieces.add(f"{name}: {type(value).__name__}")
 
     def _visit_named(self, text: str) -> _Steps:
+        if text in self._seen_texts:
+            return
+        self._seen_texts.add(text)
         for each in self._named(text):
             yield self.visit(each)
 
@@ -162,7 +166,7 @@ class _Reached:
 
     def _source(self, file: str, names: Mapping[str, Any]) -> _Source:
         if file not in self._sources:
-            self._sources[file] = _Source(file, names)
+            self._sources[file] = _source_of(_text_of(file, names))
         return self._sources[file]
 
     def _visit_node(self, node: ast.AST, names: Mapping[str, Any]) -> _Steps:
@@ -280,6 +284,7 @@ def _is_silent(node: ast.AST) -> bool:
     return isinstance(node, (ast.Import, ast.ImportFrom, ast.Pass))
 
 
+@functools.lru_cache(maxsize=8192)
 def _form(tree: ast.AST) -> str:
     """Return a syntax tree as text that is the same in every version of Python."""
     text: list[str] = []
@@ -320,16 +325,27 @@ def _row(opened: str, parts: list[list[Any]], closed: str) -> list[Any]:
     return [*row, _Sign(closed)]
 
 
-class _Source:
-    """Syntax tree of a file's current content, with its functions and classes."""
+def _text_of(file: str, names: Mapping[str, Any]) -> str:
+    """Return a file's current content."""
+    if file.startswith("<"):  # typed into a notebook, for example
+        linecache.lazycache(file, dict(names))
+    else:
+        linecache.checkcache(file)
+    return "".join(linecache.getlines(file))
 
-    def __init__(self, file: str, names: Mapping[str, Any]) -> None:
-        if file.startswith("<"):  # typed into a notebook, for example
-            linecache.lazycache(file, dict(names))
-        else:
-            linecache.checkcache(file)
+
+@functools.lru_cache(maxsize=512)
+def _source_of(text: str) -> _Source:
+    """Return the syntax tree of a file's content, since many digests use the same files."""
+    return _Source(text)
+
+
+class _Source:
+    """Syntax tree of a file's content, with its functions and classes."""
+
+    def __init__(self, text: str) -> None:
         try:
-            self.tree = ast.parse("".join(linecache.getlines(file)))
+            self.tree = ast.parse(text)
         except SyntaxError:  # the file has changed since it was loaded
             self.tree = ast.Module([], [])
 

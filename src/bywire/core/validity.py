@@ -52,6 +52,12 @@ def highest(values: Any) -> float:
     return float(np.max(values))
 
 
+def largest(values: Any) -> Any:
+    """Return the largest magnitude in the rows of each case, shape (..., 1); NaN if one is NaN."""
+    rows = np.atleast_1d(values)
+    return np.maximum(rows.max(axis=-1, keepdims=True), -rows.min(axis=-1, keepdims=True))
+
+
 def first(t: Array, happens: Any, text: str, after: str = "") -> list[str]:
     """Return a warning with the time of the first row in which an event occurs, if any.
 

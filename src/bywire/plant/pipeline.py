@@ -11,7 +11,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Length
 from bywire.core.signals import FlowResistance, Role, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import highest, row_by_row
+from bywire.core.validity import highest, largest, row_by_row
 from bywire.plant import brake_fluid
 
 Loss = Annotated[float, Signal("W", "loss in the pipeline", role=Role("sink", "pipeline"))]
@@ -82,7 +82,9 @@ def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Loss
 @row_by_row
 def watch(t: Array, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> list[str]:
     """Warn if the flow was too fast to be laminar."""
-    Re = highest(output(u, par, fluid).Re)
+    # Re rises with the pressure difference, so that only the largest one matters.
+    drop = largest(u.p_a - u.p_b)
+    Re = highest(output(Input(p_a=drop, p_b=0.0), par, fluid).Re)
     if not Re > par.Re_max:
         return []
     return [f"Re = {Re:.0f} in the pipeline is above {par.Re_max:g}, so the flow is not laminar"]

@@ -17,7 +17,9 @@ from pydantic import Field
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.bench.changes import OPTION
 from bywire.bench.computation import bench_identity, functions_digest
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.kpis.kpi import Figures
 from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
@@ -28,19 +30,22 @@ from bywire.data.toml_file import PROCEDURE, entry_lines, read_toml, require_kin
 from bywire.procedures.formula import SpeedLimit, read_speed_limit
 from bywire.procedures.motion import SPEED, Motion
 
-_Quoted = Annotated[str, Hint("write it in quotation marks, with its unit")]
+_QUOTED = Hint("write it in quotation marks, with its unit")
+_Quoted = Annotated[str, _QUOTED]
+_QuotedOrNone = Annotated[str | None, _QUOTED]
 _BRACES = re.compile(r"\{(\w+)\}")
 _OF_MAXIMUM = re.compile(r"([^%]*%)\s*of\s+v_max\s*")
 NUMBERS, MAXIMUM = "numbers.", "v_max"
 """prefix of the names of numbers, and name of the maximum speed, in changes of a procedure"""
 _SET = "set."
 _MOST = 200  # stops under the same conditions
+_LONGEST = 86400.0  # interval between stops [s]
 
 
 class NumberSection(Section):
     """A section ``[numbers.NAME]``: a number with its source, or one that is missing."""
 
-    value: Annotated[str | None, Hint("write it in quotation marks, with its unit")] = None
+    value: _QuotedOrNone = None
     source: Annotated[str | None, Hint("write the document and the paragraph")] = None
     missing: Annotated[str | None, Hint("write where the number stands")] = None
 
@@ -51,12 +56,12 @@ class StopSection(Section):
     name: Annotated[Name, Hint("write a name that is not blank")]
     source: str = ""
     speed: Annotated[Any, Field()] = None
-    until: _Quoted | None = None
+    until: _QuotedOrNone = None
     count: Annotated[Any, Field()] = 1
-    interval: _Quoted | None = None
-    cooling_speed: _Quoted | None = None
-    T_brake: _Quoted | None = None
-    deceleration: _Quoted | None = None
+    interval: _QuotedOrNone = None
+    cooling_speed: _QuotedOrNone = None
+    T_brake: _QuotedOrNone = None
+    deceleration: _QuotedOrNone = None
     adjust: Literal["first", "every"] = "first"
     judged: bool = True
     set: Table
@@ -128,6 +133,8 @@ class StopPlan:
         Whether every stop adjusts the demand, instead of only the first.
     limits
         Limits of key figures.
+    changes
+        The user's changes for these stops.
     lacking
         Names of the missing numbers without which the stops cannot run.
     unknown
@@ -147,6 +154,7 @@ class StopPlan:
     deceleration: float | None = None
     adjusts_every: bool = False
     limits: tuple[SpeedLimit, ...] = ()
+    changes: tuple[tuple[str, str], ...] = ()
     lacking: tuple[str, ...] = ()
     unknown: tuple[tuple[str, str, str], ...] = ()
 
@@ -284,6 +292,7 @@ def _plan(
         for key, value in overrides.items()
         if key != MAXIMUM and not key.startswith(NUMBERS)
     }
+    _require_free(settings | of_bench)
     shared, lacking = _filled(settings | of_bench, known)
     if lacking:
         where = ", ".join(f"{NUMBERS}{each}" for each in lacking)
@@ -292,6 +301,8 @@ def _plan(
             name="set",
             valid=where,
         )
+    if not bench_file.names_experiment(file.experiment):
+        raise unknown_name("experiment", file.experiment, EXPERIMENTS.all())
     bench = bench_file.read(file.experiment, shared)
     options = leaf_fields(bench.definition.options)
     if SPEED not in options or options[SPEED].unit.symbol != "m/s":
@@ -363,6 +374,16 @@ def _texts(changes: Mapping[str, Any], where: str) -> dict[str, str]:
         if not isinstance(value, str):
             raise not_valid(f"{where} {key}", quoted(value), "a string with its unit")
     return flat
+
+
+def _require_free(changes: Mapping[str, str]) -> None:
+    """Reject a change of the initial speed, which the stops determine."""
+    if f"{OPTION}{SPEED}" in changes:
+        raise ParameterError(
+            f"{OPTION}{SPEED} would have no effect, because the speed of each stop determines it. "
+            "Change speed instead",
+            name=f"{OPTION}{SPEED}",
+        )
 
 
 def _filled(
@@ -442,6 +463,7 @@ class _Reader:
             if getattr(section, key) is not None
         }
         changes = _texts(section.set, "set")
+        _require_free(changes)
         texts = {
             **{f"speed{k}": text for k, text in enumerate(speeds)},
             **given,
@@ -465,12 +487,15 @@ class _Reader:
             for key, (symbol, nominal) in _UNITS.items()
             if key in filled
         }
+        if values.get("interval", 0.0) > _LONGEST:
+            raise not_valid(
+                "interval", quoted(filled["interval"]), f"<= {shown(_LONGEST, 's', 'h')}"
+            )
+        if "cooling_speed" in values:
+            self._require_reached("cooling_speed", filled["cooling_speed"], values["cooling_speed"])
         v_0 = min(self._speed(filled[f"speed{k}"]) for k in range(len(speeds)))
-        settings = {
-            **self.shared,
-            **{k.removeprefix(_SET): v for k, v in filled.items() if k.startswith(_SET)},
-        }
-        bench = bench_file.read(self.bench.experiment, settings)
+        own = {k.removeprefix(_SET): v for k, v in filled.items() if k.startswith(_SET)}
+        bench = bench_file.read(self.bench.experiment, {**self.shared, **own})
         bench = bench_with_speed(bench, v_0)
         motion = Motion.of(bench, v_0)
         limits, gaps = self._limits(section, bench, motion, v_0, before)
@@ -501,8 +526,8 @@ class _Reader:
             values.get("deceleration"),
             section.adjust == "every",
             limits,
-            (),
-            gaps,
+            tuple(own.items()),
+            unknown=gaps,
         )
 
     @staticmethod
@@ -524,10 +549,13 @@ class _Reader:
             if match
             else _positive(text, "m/s", "speed", 20.0)
         )
+        self._require_reached("speed", text, v)
+        return v
+
+    def _require_reached(self, key: str, text: str, v: float) -> None:
         if v > self.v_max:
             most = f"<= v_max = {shown(self.v_max, 'm/s', 'km/h')}"
-            raise not_valid("speed", quoted(text), most, "because the vehicle is not faster")
-        return v
+            raise not_valid(key, quoted(text), most, "because the vehicle is not faster")
 
     @staticmethod
     def _share(text: str, name: str) -> float:

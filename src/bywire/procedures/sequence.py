@@ -186,6 +186,13 @@ def run_stops(
     return Procedure(plan, tuple(stops))
 
 
+def _run(bench: StopBench, estimate_error: bool = False) -> Result:
+    result = running.run(bench, estimate_error=estimate_error)
+    if result.status == "interrupted":
+        raise KeyboardInterrupt
+    return result
+
+
 def _left_out(plan: StopPlan, reason: str) -> Stop:
     gaps = [NotShown(figure, text, reason) for figure, text, _ in plan.unknown]
     gaps += [NotShown(limit.figure, limit.text, reason) for limit in plan.limits]
@@ -214,7 +221,11 @@ class _Stops:
             adjusted = None
             made.append(replace(stop, pause=pause))
             state.heat, state.begin, state.length = left, begin, length
-            state.is_known = True
+            state.is_known = left is not None
+            if left is None and k + 1 < repeats:
+                rest = _left_out(plan, f"stop {k + 1}, whose heat it needs, does not end")
+                made.append(replace(rest, first=k + 2, count=plan.count - k - 1))
+                break
             progress(plan.name, (done + k + 1) / total)
         if repeats < plan.count:
             made = [replace(made[0], count=plan.count)]
@@ -276,7 +287,7 @@ class _Stops:
         low, high = 0.0, math.inf
         reached = math.nan
         for _ in range(_ADJUSTMENTS):
-            result = running.run(self._bench(heat, scale))
+            result = _run(self._bench(heat, scale))
             reached = result.kpi("mfdd").value
             if math.isnan(reached):
                 break
@@ -300,17 +311,16 @@ class _Stops:
 
     def _stop(
         self, heat: Heat, begin: float, scale: float, k: int, adjusted: Result | None
-    ) -> tuple[Stop, Heat, float]:
+    ) -> tuple[Stop, Heat | None, float]:
         """Return a stop, the temperatures at its end, and its duration [s].
 
-        ``adjusted``: the run of this stop that adjusted its demand.
+        There are no such temperatures if the recording ends before the stop does. ``adjusted``: the
+        run of this stop that adjusted its demand.
         """
         plan, motion = self.plan, self._motion
         bench, has_error = self._bench(heat, scale), self.estimate_error and bool(plan.limits)
         result = None if has_error else adjusted
-        result = result or running.run(bench, estimate_error=has_error)
-        if result.status == "interrupted":
-            raise KeyboardInterrupt
+        result = result or _run(bench, has_error)
         rows = result.recordings[motion.label]
         course, left = self._course(rows, k)
         demand = {f"demand_{name}": bench.chosen_options.value(name) for name in self.whole.demand}
@@ -330,26 +340,32 @@ class _Stops:
         )
         return stop, left, float(course["time"][-1])
 
-    def _course(self, rows: Any, k: int) -> tuple[dict[str, Array], Heat]:
-        """Return the course of a stop until the brakes open, and the temperatures at its end."""
+    def _course(self, rows: Any, k: int) -> tuple[dict[str, Array], Heat | None]:
+        """Return the course of a stop until the brakes open, and the temperatures at its end.
+
+        Raises
+        ------
+        RunError
+            If the stop does not end, and has no limit that could be missed.
+        """
         plan, motion = self.plan, self._motion
         t, v = rows["time"].values, rows[motion.v].values
         ended = np.flatnonzero((t > 0.0) & (v <= plan.until))
-        if not ended.size:
+        if not ended.size and not plan.limits:
             raise RunError(
                 f"stop {k + 1} of {quoted(plan.name)} does not slow down to "
                 f"{shown(plan.until, 'm/s', 'km/h')} within its recording of "
                 f"{shown(float(t[-1]), 's')}. Increase options.duration, or the demand",
                 name=plan.name,
             )
-        last = int(ended[0])
+        last = int(ended[0]) if ended.size else t.size - 1
         kept = slice(int(np.searchsorted(t, -1e-9)), last + 1)
         course = {"time": t[kept], motion.v: v[kept]}
         left: dict[str, disc_heat.State] = {}
         for name, each in motion.temperatures(rows).items():
             course[self._disc(name)] = each["T_disc"][kept]
             left[name] = disc_heat.State(*(float(each[key][last]) for key in each))
-        return course, left
+        return course, left if ended.size else None
 
     def _judged(self, kpis: Sequence[Kpi]) -> tuple[tuple[Verdict, ...], tuple[NotShown, ...]]:
         by_name = {kpi.name: kpi for kpi in kpis}

@@ -6,9 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from bywire.core.typing import Array
 from bywire.core.units import convert, difference_unit, display_factor
@@ -24,6 +21,8 @@ from bywire.report.wording import amount, in_display_unit
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _NAMED = 8  # maximum number of records with room for their names
 _ROOM = 0.06  # fraction of the first panel's height for the names
@@ -285,6 +284,9 @@ def residual_figure(estimate: Estimate) -> Figure:
     Weighted residuals in order, their histogram with the normal distribution of the same variance,
     and their autocorrelation with the band for white residuals.
     """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
     r = estimate.residuals
     figure = Figure(figsize=(style.WIDTH, 4.6), layout="constrained", facecolor="white")
     grid = figure.add_gridspec(2, 2)
@@ -339,6 +341,8 @@ def correlation_matrix(estimate: Estimate) -> Figure:
     names, c = estimate.names, estimate.correlation
     size = len(names)
     height = min(max(1.6 + 0.36 * size, 2.4), 6.5)
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(style.WIDTH, height), layout="constrained", facecolor="white")
     axes = figure.subplots()
     image = axes.imshow(c, cmap="RdBu_r", vmin=-1.0, vmax=1.0)

@@ -60,7 +60,7 @@ def temperature_figure(groups: Sequence[Sequence[HeatedStop]]) -> Figure:
             color = style.SEQUENCE[k % len(style.SEQUENCE)]
             for each in stops:
                 T, _ = in_display_unit(each.discs[label], "K")
-                shown = label if each is stops[0] else None
+                shown = style.plain(label) if each is stops[0] else None
                 t = each.begin + each.time
                 axes.plot(*decimate(t, T), color=color, linewidth=1.6, label=shown)
                 if each.pause_time.size:
@@ -80,7 +80,7 @@ def limit_figure(limits: Sequence[UsedLimit]) -> Figure:
     colors = {"met": style.GREEN, "missed": style.VERMILLION}
     for k, each in enumerate(limits):
         axes.barh(k, each.share, height=0.6, color=colors.get(each.outcome, style.GRAY))
-    axes.set_yticks(range(len(limits)), [each.label for each in limits])
+    axes.set_yticks(range(len(limits)), [style.plain(each.label) for each in limits])
     axes.invert_yaxis()
     look = style.STROKES[Role.LIMIT]
     axes.axvline(100.0, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth)

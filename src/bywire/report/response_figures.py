@@ -9,8 +9,6 @@ from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
@@ -24,6 +22,7 @@ from bywire.report.wording import amount, clean, in_display_unit, unit_text
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 
 
@@ -230,6 +229,8 @@ def differences(
     ParameterError
         Without anything to draw.
     """
+    from matplotlib.ticker import NullFormatter
+
     if not sizes:
         raise ParameterError("differences: no cause was passed. Pass at least one")
     figure, panels = style.new_figure(5.2, (1.0, 1.0))

@@ -89,7 +89,8 @@ class Runs:
             When the user stopped a run, or another part failed.
         """
         bench = Bench(experiment, name, overrides or {}, options or {}, stimulus or {})
-        key = repr(bench)
+        values = (bench.par.flat(), bench.chosen_options.flat(), bench.chosen_stimuli)
+        key = repr((experiment, name, *values))  # a default that is stated is the same run
         with self._lock:
             is_first = key not in self._known
             result = self._known.setdefault(key, Future())

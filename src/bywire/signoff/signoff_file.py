@@ -188,14 +188,17 @@ def _evidence(
 def _together(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
     """Return the evidence with the limits of equal computations joined, so that they run once."""
     limits: dict[str, dict[str, Limit]] = {}
+    tasks: dict[str, Task] = {}
     for each in evidence:
+        tasks.setdefault(each.task.title, each.task)
         joined = limits.setdefault(each.task.title, {})
         joined.update({str(limit): limit for limit in each.limits})
     made: list[Evidence] = []
     first: dict[str, Evidence] = {}
     for each in evidence:
         with placed(each.place):
-            task = each.task.with_limits(tuple(limits[each.task.title].values()))
+            title = each.task.title
+            task = tasks[title].with_limits(tuple(limits[title].values()))
             other = first.setdefault(task.shelf, replace(each, task=task))
             if other.task.digest != task.digest:
                 raise ParameterError(

@@ -19,6 +19,8 @@ _TRUTHS = _COMPARISONS | {"and", "or", "not"}
 _FREE = _TRUTHS | {"if_else_zero", "select", "neg"}  # about the cost of detecting a change
 _COST = {"inv": 8.0, "sqrt": 8.0, "exp": 40.0, "sin": 40.0, "cos": 40.0, "log": 40.0, "pow": 60.0}
 _WORTH_ATOM, _WORTH_MODE = 4.0, 0.15
+_SELECTIONS = ("if_else_zero", "select")
+_AHEAD = 40  # maximum number of further operations to compute early for a costly function
 
 
 @dataclass(frozen=True)
@@ -77,9 +79,48 @@ def modes(graph: Graph, roots: Sequence[Node], level: Levels) -> Modes:
     values = [n for n in order if n in deciding and n not in early and not _is_truth(graph, n)]
     saved = sum(cost(graph, n) for n in values if level[n] == 2) - 2.0 * len(atoms)
     if saved < _WORTH_MODE * sum(cost(graph, n) for n in substep):
-        return Modes([], [], [], substep)
-    late = frozenset(values)
-    return Modes(first, atoms, values, [n for n in substep if n not in early and n not in late])
+        return Modes([], [], [], _costly_first(graph, substep))
+    apart = early.union(values)
+    rest = [n for n in substep if n not in apart]
+    return Modes(first, atoms, values, _costly_first(graph, rest))
+
+
+def _costly_first(graph: Graph, order: Sequence[Node]) -> list[Node]:
+    """Return an order that begins with costly functions, if they need few further operations.
+
+    A processor computes a few hundred instructions at the same time. If a long function is needed
+    soon after it begins, the processor waits for it.
+    """
+    users: dict[Node, list[Node]] = {}
+    for node in order:
+        for argument in graph.arguments(node):
+            users.setdefault(argument, []).append(node)
+    place = {node: k for k, node in enumerate(order)}
+    leading: set[Node] = set()
+    for node in order:
+        if graph.nodes[node].op not in COSTLY:
+            continue
+        cone, stack = set[Node](), [_selection_of(graph, node, users)]
+        while stack:
+            each = stack.pop()
+            if each in place and each not in leading and each not in cone:
+                cone.add(each)
+                stack.extend(graph.arguments(each))
+        if len(cone) <= _AHEAD:
+            leading |= cone
+    return sorted(order, key=lambda n: (n not in leading, place[n]))
+
+
+def _selection_of(graph: Graph, node: Node, users: Mapping[Node, Sequence[Node]]) -> Node:
+    """Return the selection that alone reads a function or its product; otherwise, the function."""
+    end = node
+    while len(readers := users.get(end, ())) == 1:
+        end = readers[0]
+        if graph.nodes[end].op in _SELECTIONS:
+            return end
+        if graph.nodes[end].op != "mul":
+            break
+    return node
 
 
 def _is_truth(graph: Graph, node: Node) -> bool:
@@ -127,7 +168,6 @@ def _poor_atoms(
 # others. The values do not change.
 
 _WORTH = 45.0  # cost of operations: a costly function and a few before it
-_SELECTIONS = ("if_else_zero", "select")
 
 
 @dataclass(frozen=True)

@@ -166,7 +166,7 @@ static inline V each(double (*f)(double), V a) {
 # ready before the polynomial. The rounding constant 1.5 * 2^52 leaves k in the low bits of the sum.
 # sin, cos: Cody-Waite reduction by multiples of pi/2 in three parts, valid up to |x| = 1e5; Taylor
 # series on |r| <= pi/4 up to r^16. The library computes larger arguments, and powers and logarithms
-# near zero.
+# near zero. Functions with the suffix "here" are compiled in place.
 _FUNCTIONS = r"""
 static IN_PLACE V N(exp_within)(V x) {
   const V t = x * 1.4426950408889634 + MAGIC;
@@ -181,9 +181,12 @@ static IN_PLACE V N(exp_within)(V x) {
   const V scale = REAL((BITS(t) + 1023) << 52);
   return scale * a + ((scale * r4) * b + (scale * r8) * c);
 }
-static FUNCTION V N(exp)(V x) { return N(exp_within)(WITHIN(x, SET(-708.0), SET(709.0))); }
+static IN_PLACE V N(exp_here)(V x) {
+  return N(exp_within)(WITHIN(x, SET(-708.0), SET(709.0)));
+}
+static FUNCTION V N(exp)(V x) { return N(exp_here)(x); }
 
-static FUNCTION V N(turned)(V x, int64_t quarter) {
+static IN_PLACE PAIR N(sine_cosine)(V x) {
   const V t = x * 0.63661977236758134308 + MAGIC;
   const V k = t - MAGIC;
   const V r = ((x - k * 1.57079632673412561417e+00) - k * 6.07710050630396597660e-11)
@@ -195,14 +198,20 @@ static FUNCTION V N(turned)(V x, int64_t quarter) {
   const V c = 1.0 + z * (-0.5 + z * (1.0 / 24.0 + z * (-1.0 / 720.0 + z * (1.0 / 40320.0
       + z * (-1.0 / 3628800.0 + z * (1.0 / 479001600.0 + z * (-1.0 / 87178291200.0
       + z * (1.0 / 20922789888000.0))))))));
-  const I n = BITS(t) + quarter;
-  const I odd = -(n & 1);
-  const V y = REAL((BITS(c) & odd) | (BITS(s) & ~odd));
-  return REAL(BITS(y) ^ ((n & 2) << 62));
+  const I n = BITS(t), odd = -(n & 1), sine = BITS(s), cosine = BITS(c);
+  const V y = REAL(((cosine & odd) | (sine & ~odd)) ^ ((n & 2) << 62));
+  const V w = REAL(((sine & odd) | (cosine & ~odd)) ^ (((n + 1) & 2) << 62));
+  PAIR both;
+  FIRST(both) = BEYOND(sin, LT(SET(1e5), FABS(x)), x, y);
+  SECOND(both) = BEYOND(cos, LT(SET(1e5), FABS(x)), x, w);
+  return both;
 }
 
-static FUNCTION V N(sin)(V x) { return BEYOND(sin, LT(SET(1e5), FABS(x)), x, N(turned)(x, 0)); }
-static FUNCTION V N(cos)(V x) { return BEYOND(cos, LT(SET(1e5), FABS(x)), x, N(turned)(x, 1)); }
+static IN_PLACE V N(sin_here)(V x) { const PAIR y = N(sine_cosine)(x); return FIRST(y); }
+static IN_PLACE V N(cos_here)(V x) { const PAIR y = N(sine_cosine)(x); return SECOND(y); }
+static SHARED PAIR N(turned)(V x) { return N(sine_cosine)(x); }
+static inline V N(sin)(V x) { const PAIR y = N(turned)(x); return FIRST(y); }
+static inline V N(cos)(V x) { const PAIR y = N(turned)(x); return SECOND(y); }
 
 /* log a, a > 0, as *low plus the result, with a = m 2^k, m from sqrt(1/2) to sqrt(2), f = m - 1.
  * With s = f/(2 + f): log m = f - f^2/2 + s (f^2/2 + z p(z)), z = s^2, Taylor series of atanh up to
@@ -258,6 +267,18 @@ static inline double within(double a, double low, double high) {
 #define N(f) bw_##f
 #define FUNCTION __attribute__((noinline, unused))
 #define IN_PLACE inline __attribute__((always_inline))
+/* Compilers merge two calls of such a function if its result fits into a register. */
+#define SHARED __attribute__((noinline, unused, const))
+#if defined(__GNUC__) && (defined(__x86_64__) || defined(__aarch64__)) && !defined(__CUDACC_RTC__)
+typedef double bw_pair __attribute__((vector_size(16)));
+#define FIRST(both) (both)[0]
+#define SECOND(both) (both)[1]
+#else
+typedef struct { double first, second; } bw_pair;
+#define FIRST(both) (both).first
+#define SECOND(both) (both).second
+#endif
+#define PAIR bw_pair
 #define SET(x) (x)
 #define BITS(x) bits_of(x)
 #define REAL(i) real_of(i)
@@ -276,6 +297,10 @@ static inline double within(double a, double low, double high) {
 #undef I
 #undef N
 #undef FUNCTION
+#undef SHARED
+#undef PAIR
+#undef FIRST
+#undef SECOND
 #undef SET
 #undef BITS
 #undef REAL
@@ -294,6 +319,10 @@ _ALL_LANES = (
     r"""
 #define N(f) lanes_##f
 #define FUNCTION inline
+#define SHARED IN_PLACE
+typedef struct { V first, second; } PAIR;
+#define FIRST(both) (both).first
+#define SECOND(both) (both).second
 #define BITS(x) ((I)(x))
 #define WITHIN(a, low, high) MIN(MAX(a, low), high)
 #define REAL(i) ((V)(i))

@@ -241,10 +241,37 @@ def unresolved(
     for J in closed:
         # Without contacts, both Jacobians are equal, and no decomposition is necessary.
         changed = (opened != J).any((1, 2)) & np.isfinite(opened + J).all((1, 2))
-        cases = [k for k in np.flatnonzero(changed) if not texts[k]]
-        for k, text in zip(cases, _too_fast(opened[cases], J[cases], step), strict=True):
-            texts[k] = text
+        doubtful = np.flatnonzero(changed)
+        doubtful = doubtful[~_are_surely_resolved(J[doubtful], step)]
+        cases = [k for k in doubtful if not texts[k]]
+        if cases:
+            for k, text in zip(cases, _too_fast(opened[cases], J[cases], step), strict=True):
+                texts[k] = text
     return texts
+
+
+_WORST = 1e9  # condition number of eigenvectors beyond which the disks would say nothing
+
+
+def _are_surely_resolved(closed: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
+    """Return which Jacobians have only slow or well damped modes, without their eigenvalues.
+
+    With the eigenvectors of the first one as basis, the others are almost diagonal, and each
+    eigenvalue is in one of Gershgorin's disks. This takes a fifth of the time of a decomposition.
+    """
+    if len(closed) < 2:
+        return np.zeros(len(closed), dtype=bool)
+    _, basis = np.linalg.eig(closed[0])
+    condition = np.linalg.cond(basis)
+    if not condition < _WORST:
+        return np.zeros(len(closed), dtype=bool)
+    turned = np.linalg.inv(basis) @ closed @ basis
+    centers = np.diagonal(turned, axis1=1, axis2=2)
+    rounding = 16.0 * np.finfo(float).eps * condition * np.abs(closed).sum(axis=(1, 2))
+    radii = np.abs(turned).sum(axis=2) - np.abs(centers) + rounding[:, None]
+    fastest = (np.abs(centers) + radii) * (1.0 + 1e-6)
+    are_slow, are_damped = step * fastest <= SAFE, -centers.real - radii >= DAMPED * fastest
+    return np.asarray((are_slow | are_damped).all(axis=1))
 
 
 def _too_fast(opened: NDArray[np.float64], closed: NDArray[np.float64], step: float) -> list[str]:

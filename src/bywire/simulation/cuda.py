@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -198,7 +198,7 @@ class CudaKernel:
             state, par = memory.room(vector.nbytes), memory.room(parameters.nbytes)
             memory.put(state, vector)
             memory.put(par, parameters)
-            given = _Given(memory, inputs, _stimulus_rows(schedule))
+            given = _Given(memory, inputs, _stimulus_rows(schedule), self.array)
             plan = memory.room(_plan_size(schedule, self._inputs[1]))
             pieces = _pieces(schedule, begin, end)
             counts = [rows_between(schedule, *piece) for piece in pieces]
@@ -222,20 +222,9 @@ class CudaKernel:
                 numbers = [*plan_array(schedule, first, last, self._signals)]
                 numbers += [self.lanes, recording.cases, ahead, *recording.apart, *frames, *where]
                 memory.put(plan, np.array(numbers, dtype=np.int64))
-                memory.run(
-                    self._function,
-                    -(-self.lanes // THREADS),
-                    THREADS,
-                    (
-                        par,
-                        float(schedule.step),
-                        given.place,
-                        state,
-                        plan,
-                        int(room) + recording.offset,
-                        edges,
-                    ),
-                )
+                place, step = int(room) + recording.offset, float(schedule.step)
+                arguments = (par, step, given.place, state, plan, place, edges)
+                memory.run(self._function, -(-self.lanes // THREADS), THREADS, arguments)
                 recording.count += counts[number]
             recording.fetch(memory, room)
             memory.get(state, vector)
@@ -264,18 +253,29 @@ class _Given:
         The device's memory, and the stimulus.
     most
         Maximum number of rows in an interval.
+    array
+        ``array(shape)`` allocates page-locked memory, from which copies are fast.
     """
 
-    def __init__(self, memory: Memory, inputs: Inputs, most: int) -> None:
+    def __init__(
+        self,
+        memory: Memory,
+        inputs: Inputs,
+        most: int,
+        array: Callable[[tuple[int, ...]], Array],
+    ) -> None:
         self._memory, self._inputs = memory, inputs
         size = sum(len(each) * min(each.shape[1], most) for each in inputs.values)
         self.place = memory.room(FLOAT * size)
+        self._buffer = array((size,))
 
     def rows(self, begin: int, end: int) -> list[int]:
         """Copy the rows from begin to end, and return the place and distances of each number."""
         parts = [each[:, begin:end] if each.shape[1] > 1 else each for each in self._inputs.values]
         if parts:
-            self._memory.put(self.place, np.concatenate([part.ravel() for part in parts]))
+            filled = self._buffer[: sum(part.size for part in parts)]
+            np.concatenate([part.ravel() for part in parts], out=filled)
+            self._memory.put(self.place, filled)
         where, start = [], 0
         for part, each in zip(parts, self._inputs.values, strict=True):
             by_row = int(each.shape[1] > 1)

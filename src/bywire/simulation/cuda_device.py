@@ -13,10 +13,12 @@ import importlib
 import math
 import os
 import threading
+import time
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
+from multiprocessing import parent_process
 from types import ModuleType
 from typing import Any
 
@@ -174,6 +176,8 @@ _BLOCKING = 4  # CU_CTX_SCHED_BLOCKING_SYNC
 _MEGA = 1e6
 _LEAST = 12000  # version of the driver's interface, 1000 major + 10 minor, as for NVRTC 12
 _EXCLUSIVE = 3  # CU_COMPUTEMODE_EXCLUSIVE_PROCESS
+_UNUSED = 8  # blocks of page-locked memory that are kept for later arrays
+_PATIENCE, _POLLED = 10.0, 0.05  # s: wait of a study's process for memory, and between attempts
 _PITCH = 2**31 - 1  # maximum distance of two lines in a copy [byte]
 
 # Statuses of the driver, CUresult, by what the user can do about them.
@@ -261,8 +265,8 @@ class CudaDevice:
         """Return an uninitialized array in page-locked memory, which the device fills directly.
 
         The system maps new memory page by page, which takes longer than to fill it. So the memory
-        of an array that nothing refers to any more is used again. Memory that cannot be locked is
-        ordinary memory.
+        of the last arrays that nothing refers to any more is used again. Memory that cannot be
+        locked is ordinary memory.
         """
         size = max(math.prod(shape) * FLOAT, 8)
         with self._current():
@@ -271,8 +275,8 @@ class CudaDevice:
                 block = min(fitting, key=lambda each: each[1])
                 self._free.remove(block)
             else:
-                while self._free:
-                    self._checked(self._driver.cuMemFreeHost(self._free.pop()[0]))
+                while len(self._free) >= _UNUSED:
+                    self._checked(self._driver.cuMemFreeHost(self._free.pop(0)[0]))
                 locked = self._driver.cuMemHostAlloc(size, 0)
                 if int(locked[0]) in _NOT_LOCKED:
                     return np.empty(shape)
@@ -418,7 +422,13 @@ class Memory:
         DeviceError
             When there is not enough free memory.
         """
-        place = self._checked(self._driver.cuMemAlloc(max(size, 8)), size)
+        # Other processes of a study free their memory at the end of their turn.
+        until = time.monotonic() + (_PATIENCE if parent_process() is not None else 0.0)
+        given = self._driver.cuMemAlloc(max(size, 8))
+        while int(given[0]) == _OUT_OF_MEMORY and time.monotonic() < until:
+            time.sleep(_POLLED)
+            given = self._driver.cuMemAlloc(max(size, 8))
+        place = self._checked(given, size)
         self._places.append(place)
         return place
 

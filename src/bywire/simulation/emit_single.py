@@ -21,7 +21,14 @@ from bywire.simulation.branches import (
 )
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emit_rare import most_tries, rare_substep
-from bywire.simulation.expressions import Namer, as_number, condition, needed
+from bywire.simulation.expressions import (
+    PLAIN_C,
+    Dialect,
+    Namer,
+    as_number,
+    condition,
+    needed,
+)
 from bywire.simulation.graph import Graph, Node
 from bywire.simulation.schedule import Layout
 from bywire.simulation.stages import (
@@ -57,11 +64,14 @@ class Caller:
         Format strings for number ``k`` of a stimulus row and of the state vector.
     row
         Statements that find the stimulus row of a frame ``f``; ``nu``: its length.
-    record
-        Statements that record the outputs ``o``; ``count``: their number.
+    outputs, record
+        Declarations of the outputs ``o``, and statements that record them; ``count``: their number.
     pause, end
         Statements at the beginning of a frame ``f``, which pause after ``most`` attempted parts of
         substeps, and statements after the last frame.
+    in_place
+        Whether the substep contains the code of elementary functions instead of calls, before which
+        a processor stores all registers.
     """
 
     runtime: str
@@ -71,8 +81,10 @@ class Caller:
     entry: str
     row: str
     record: str
+    outputs: str = "double o[{count} + 1];"
     pause: str = ""
     end: str = ""
+    in_place: bool = False
 
 
 EXPORTED = Caller(
@@ -89,9 +101,17 @@ EXPORTED = Caller(
 ONE_RUN = replace(
     EXPORTED,
     head=SIGNATURE.format("int64_t"),
-    begin="const double most = " + EXPORTED.entry.format(k="{tries}") + " + {most};",
+    begin="const double most = "
+    + EXPORTED.entry.format(k="{tries}")
+    + """ + {most};
+  int is_whole = chosen == {count};
+  for (int64_t j = 0; j < chosen; ++j) is_whole &= selection[j] == j;""",
+    outputs="""double own[{count} + 1], *const row = rec + (f / every - row0) * chosen;
+      double *const o = is_whole ? row : own; // a row of all outputs needs no copy""",
+    record="if (!is_whole) for (int64_t j = 0; j < chosen; ++j) row[j] = own[selection[j]];",
     pause="if (__builtin_expect(tries > most, 0) && f > begin && f < end) break;",
     end="return f;",
+    in_place=True,
 )
 """one run; a long call ends early and returns the frame at which to continue"""
 
@@ -135,8 +155,10 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
         if level[node] == 1 and node not in mode.values
     ]
 
-    def block(order: Sequence[Node]) -> list[str]:
-        return branching_statements(graph, order, name, "const double ")
+    dialect = _in_place(graph, mode.rest) if caller.in_place else PLAIN_C
+
+    def block(order: Sequence[Node], dialect: Dialect = PLAIN_C) -> list[str]:
+        return branching_statements(graph, order, name, "const double ", dialect)
 
     lead, groups, rest = remembered(graph, mode.rest, pass_roots, carried, level)
 
@@ -154,7 +176,7 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
         lines: list[str] = []
         while left:
             at = next((k for k, node in enumerate(left) if node in arms), len(left))
-            lines += block(left[:at])
+            lines += block(left[:at], dialect)
             if at < len(left):
                 both = arms[left[at]]
                 first, last = (substep(arm.nodes, {*kept, *arm.kept}) for arm in both)
@@ -195,7 +217,7 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
     {caller.row.format(**parts)}
     {indented(ticks, 4)}
     if (f % every == 0) {{
-      double o[{max(len(stages.output), 1)}];
+      {caller.outputs.format(**parts)}
       {indented(outputs, 6)}
       {caller.record.format(**parts)}
     }}
@@ -220,6 +242,21 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
   {caller.end}
 }}
 """
+
+
+_FEW = 4  # maximum number of copies of the exponential, whose compilation takes time
+
+
+def _in_place(graph: Graph, order: Sequence[Node]) -> Dialect:
+    """Return the dialect of a substep with elementary functions in place.
+
+    Compilers then share the sine and cosine of the same angle.
+    """
+    chosen = {"sin", "cos"}
+    if sum(1 for node in order if graph.nodes[node].op == "exp") <= _FEW:
+        chosen.add("exp")
+    calls = {op: f"{f}_here" if op in chosen else f for op, f in PLAIN_C.calls.items()}
+    return replace(PLAIN_C, calls=calls)
 
 
 def _mode_state(mode: Modes, name: Namer) -> list[str]:

@@ -245,7 +245,7 @@ def simulate_group(
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
     recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
     shape = len(recorded), len(runs), schedule.rows - first
-    held = kernel.hold(shape) if hold and not any(run.changes for run in runs) else None
+    held = kernel.hold(shape) if hold and not change(runs) else None
     values: Array | HeldRows = kernel.array(shape) if held is None else held
     if isinstance(values, np.ndarray):
         values[len(wanted) :] = 0.0  # sums up the work of changes
@@ -521,7 +521,8 @@ def case_matrix(run: Run, variations: Variations) -> Array:
             value=str(lengths),
         )
     count = next(iter(lengths.values()))
-    matrix = np.repeat(np.array(list(run.par.leaves().values()))[:, None], count, axis=1)
+    matrix = np.empty((len(names), count))
+    matrix[:] = np.array(list(run.par.leaves().values()))[:, None]
     for name, array in arrays.items():
         _check_extremes(run, name, array)
         matrix[names.index(name)] = array
@@ -658,8 +659,9 @@ def simulate_ensemble(
     def group(first: int) -> None:
         cases = np.arange(first, first + kernel.lanes)
         vector = np.repeat(start[:, None], kernel.lanes, axis=1)
-        # Lanes beyond the last case repeat this case.
-        columns = np.ascontiguousarray(matrix[:, np.minimum(cases, count - 1)])
+        columns = matrix[:, first : first + kernel.lanes]
+        beyond = kernel.lanes - columns.shape[1]  # lanes that repeat the last case
+        columns = np.concatenate((columns, np.repeat(columns[:, -1:], beyond, axis=1)), axis=1)
         rows = values[cases[0] : cases[-1] + 1]
         kernel.advance(schedule, columns, stimulus, vector, rows, schedule.frames)
         last = min(cases[-1], count - 1)

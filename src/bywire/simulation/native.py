@@ -173,6 +173,12 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
+def rows_pointer(rows: NDArray[Any]) -> Callable[[int], ctypes.c_void_p]:
+    """Return a function of a row's number that returns the row's address."""
+    first, size = pointer(rows).value or 0, rows.strides[0]
+    return lambda row: ctypes.c_void_p(first + row * size)
+
+
 def text_digest(text: str) -> str:
     """Return the digest of a kernel's C code without comments."""
     return hashlib.sha256(_COMMENT.sub("", text).encode()).hexdigest()
@@ -212,20 +218,13 @@ class SingleKernel:
         rows
             Shape (recorded rows of these frames, selected outputs).
         """
+        step = ctypes.c_double(request.schedule.step)
+        inputs = (pointer(request.parameters), step, pointer(request.stimulus), pointer(state))
+        selection, row_at = pointer(request.selection), rows_pointer(rows)
 
         def call(first: int, last: int, row: int) -> int:
             plan = plan_array(request.schedule, first, last, request.selection.size)
-            return int(
-                self._run(
-                    pointer(request.parameters),
-                    ctypes.c_double(request.schedule.step),
-                    pointer(request.stimulus),
-                    pointer(state),
-                    pointer(plan),
-                    pointer(request.selection),
-                    pointer(rows[row:]),
-                )
-            )
+            return int(self._run(*inputs, pointer(plan), selection, row_at(row)))
 
         run_in_calls(request.schedule, begin, end, call)
 

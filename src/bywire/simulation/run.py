@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -277,11 +277,17 @@ def contact_doubts(
         return [""] * count
     jacobians = prepare(run.model, run.par).contact_jacobians
     patterns = [jacobians.sparsity_out(k) for k in range(jacobians.n_out())]
-    computed = BufferedCall(jacobians.map(count) if count > 1 else jacobians)
+    computed = BufferedCall(_mapped(jacobians, count))
     given = (np.ravel(np.asarray(each, dtype=float)) for each in (states, memories, table))
     entries = (each.reshape(count, -1) for each in computed(*given))
     opened, *closed = map(_matrices, patterns, entries)
     return unresolved(opened, closed, run.step)
+
+
+@lru_cache(maxsize=16)
+def _mapped(function: Any, count: int) -> Any:
+    """Return a CasADi function of the arguments of several runs at a time."""
+    return function.map(count) if count > 1 else function
 
 
 def _matrices(pattern: Any, entries: Array) -> Array:

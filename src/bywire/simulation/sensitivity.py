@@ -6,10 +6,9 @@ import ctypes
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.arguments import checked
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
@@ -19,7 +18,7 @@ from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_lib
 from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.expressions import needed
-from bywire.simulation.native import Request, plan_array, pointer, run_in_calls
+from bywire.simulation.native import Request, plan_array, pointer, rows_pointer, run_in_calls
 from bywire.simulation.program import Program
 from bywire.simulation.run import (
     Run,
@@ -104,22 +103,19 @@ class TangentKernel:
         rows_t
             Derivatives of the rows, shape (rows, signals, directions).
         """
+        step = ctypes.c_double(request.schedule.step)
+        inputs = (pointer(request.parameters), step, pointer(request.stimulus), pointer(state))
+        selection = pointer(request.selection)
+        directions = (pointer(seeds), pointer(tangents))
+        row_at, row_t_at = rows_pointer(rows), rows_pointer(rows_t)
 
         def call(first: int, last: int, row: int) -> int:
             plan = plan_array(request.schedule, first, last, request.selection.size)
-            arrays: list[NDArray[Any]] = [
-                request.stimulus,
-                state,
-                plan,
-                request.selection,
-                rows[row:],
-                seeds,
-                tangents,
-                rows_t[row:],
-            ]
-            step = ctypes.c_double(request.schedule.step)
-            places = [pointer(array) for array in arrays]
-            return int(self._run(pointer(request.parameters), step, *places))
+            return int(
+                self._run(
+                    *inputs, pointer(plan), selection, row_at(row), *directions, row_t_at(row)
+                )
+            )
 
         run_in_calls(request.schedule, begin, end, call, _CHUNK)
 
@@ -181,7 +177,9 @@ def simulate_with_sensitivities(
         )
     require_unchanged(run.changes, "sensitivities")
     prepared = prepare(run.model, run.par)
-    directions = _directions(run, parameters, prepared.program.parameter_names)
+    model, known = run.model, tuple(prepared.program.parameter_names)
+    fields = (model.State._fields, model.Stimulus._fields)
+    directions = _directions(*fields, tuple(parameters), known)
     _require_shape("initial", initial, (len(run.state), len(parameters)))
     _require_shape("memory", memory, (len(run.memory), len(parameters)))
     from_start = directions.initial + (0.0 if initial is None else initial)
@@ -266,9 +264,15 @@ class _Directions:
     initial: Array
 
 
-def _directions(run: Run, requested: Sequence[str], known: Sequence[str]) -> _Directions:
-    states = [f"initial.{name}" for name in run.model.State._fields]
-    stimuli = [f"stimulus.{name}" for name in run.model.Stimulus._fields]
+@lru_cache(maxsize=64)  # a fit requests the same directions for every run
+def _directions(
+    state: tuple[str, ...],
+    stimulus: tuple[str, ...],
+    requested: tuple[str, ...],
+    known: tuple[str, ...],
+) -> _Directions:
+    states = [f"initial.{name}" for name in state]
+    stimuli = [f"stimulus.{name}" for name in stimulus]
     for name in requested:
         if name not in (*known, *states, *stimuli) and not name.startswith("start."):
             raise unknown_name("parameter", name, (*known, *states, *stimuli))

@@ -14,6 +14,7 @@ from functools import partial
 from itertools import islice
 from typing import Any, Generic, Protocol, TypeVar
 
+from bywire.bench.ensemble import numbers_per_case
 from bywire.cases.runner import as_completed
 from bywire.core.arguments import whole_number
 from bywire.core.brake import load_brakes, loaded_files
@@ -21,10 +22,10 @@ from bywire.core.callers import collected_warnings, option
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.libraries import allow_dask
-from bywire.core.machine import worker_count
+from bywire.core.machine import machine_memory, worker_count
 from bywire.data.file_format import library
 from bywire.simulation.engine import CUDA
-from bywire.studies.plan import StudyPlan
+from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.store import Columns, PlacedChunk, computed_chunks
 
 _Chunks = Iterable[int | PlacedChunk]
@@ -108,7 +109,7 @@ _AHEAD = 2  # tasks in flight for each worker, so that no worker is idle
 _MOST = 4
 
 _Task = tuple[float, list[tuple[int, Columns]]]
-"""result of a task: time [s], and its chunks"""
+"""result of a task: processor time [s], and its chunks"""
 
 
 class _Tasks:
@@ -121,7 +122,7 @@ class _Tasks:
     workers
         Number of workers that share them.
     seconds
-        Target duration of a task [s].
+        Target processor time of a task [s].
     most
         Maximum number of chunks in a task.
     """
@@ -150,17 +151,17 @@ class _Tasks:
 
 
 def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan, threads: int | None = 1) -> _Task:
-    """Return chunks, of which several are computed together, and their computing time."""
-    begin = time.perf_counter()
+    """Return chunks, of which several are computed together, and their processor time."""
+    begin = time.process_time()  # does not depend on other programs, unlike the elapsed time
     batches = (computed_chunks(plan, batch, threads) for batch in batched(chunks, _MOST))
     given = [computed for batch in batches for computed in batch]
-    return time.perf_counter() - begin, given
+    return time.process_time() - begin, given
 
 
 # --- On a cluster of dask.distributed
 
 _SECONDS = 10.0  # time limit to reach a cluster
-_TASK = 0.5  # s: target duration of a task of a cluster
+_TASK = 0.5  # s: target processor time of a task of a cluster
 # Dask works periodically: stack samples every 10 ms, ticks every 20 ms, memory checks every 100 ms.
 # A core's worker, scheduler and client use 8 % of a core for this, or 1.4 % with these settings.
 CLUSTER_SETTINGS = {
@@ -271,10 +272,12 @@ def _lost(client: Any, error: BaseException) -> str:
 
 # --- Choice of the executor
 
-_POOLED = 0.2  # s: target duration of a task in a pool; a killed study loses its tasks
-# Chunks in one batch on a graphics processor: 4,096 cases, which for hard braking need 2 GB of this
-# machine's memory for stimuli and rows.
-_TOGETHER = 64
+_POOLED = 0.2  # s: target processor time of a task in a pool; a killed study loses its tasks
+# Chunks in one batch on a graphics processor. Up to 8,192 cases, a kernel takes as long as for one
+# case, and processes take turns. So a batch has at least 2,048 cases if there are that many, and at
+# most as many as the largest processors hold.
+_LEAST_TOGETHER, _TOGETHER = 32, 512
+_SHARE = 0.5  # of this machine's memory for the stimuli and rows of the batches of all processes
 _MOST_WORKERS = 1024
 # Minimum number of chunks that justify processes; a process that loads everything takes a second.
 _WORTH_COPIES, _WORTH = 2, 8
@@ -315,7 +318,7 @@ class InProcess:
 
     def _computed(self, plan: StudyPlan, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
         if self.together > 1:
-            for several in batched(chunks, self.together):
+            for several in batched(chunks, _fitting(plan, self.together, 1)):
                 yield from computed_chunks(plan, several)
             return
         tasks = _Tasks(chunks, 1, _POOLED, _MOST)
@@ -348,7 +351,8 @@ class Pool:
         """Return the computation; see `Executor`."""
         fewer = f"resume it with fewer {option('workers')}"
         with processes_with_brakes(self.workers, fewer, _give, plan) as pool:
-            yield _InPool(pool, self.workers, self.together)
+            together = _fitting(plan, self.together, self.workers)
+            yield _InPool(pool, self.workers, together)
 
 
 def executor_of(
@@ -381,10 +385,29 @@ def executor_of(
     require_workers(workers, cluster, engine)
     if cluster:
         return Cluster(cluster)
-    count = worker_count(workers, together or chunks)
+    at_once = together or chunks
+    if engine == CUDA:
+        count = workers_on_device(workers, at_once)
+        rounds = -(-at_once // (count * _TOGETHER))
+        batch = -(-at_once // (count * rounds))
+        return Pool(count, batch) if count > 1 else InProcess(batch)
+    count = worker_count(workers, at_once)
     is_worth = workers is not None or chunks >= (_WORTH_COPIES if may_copy() else _WORTH)
-    batch = min(_TOGETHER, -(-(together or chunks) // count)) if engine == CUDA else 1
-    return Pool(count, batch) if count > 1 and is_worth else InProcess(batch)
+    return Pool(count) if count > 1 and is_worth else InProcess()
+
+
+def workers_on_device(workers: int | None, chunks: int) -> int:
+    """Return the number of processes for a number of chunks on a graphics processor."""
+    return worker_count(workers, max(chunks if workers else chunks // _LEAST_TOGETHER, 1))
+
+
+def _fitting(plan: StudyPlan, together: int, workers: int) -> int:
+    """Return the number of chunks per batch, split evenly if they exceed this machine's memory."""
+    if together == 1:
+        return 1
+    size = 8 * CHUNK * numbers_per_case(plan.bench)
+    most = max(int(_SHARE * machine_memory() / workers / size), 1)
+    return -(-together // -(-together // most))
 
 
 def require_workers(workers: int | None, cluster: str, engine: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -16,7 +16,7 @@ from bywire.core.typing import Progress
 from bywire.simulation.cuda_device import find_device
 from bywire.simulation.engine import CUDA
 from bywire.studies.designs import WORST
-from bywire.studies.executor import executor_of, require_workers
+from bywire.studies.executor import executor_of, require_workers, workers_on_device
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.sought_cases import rare_failures, worst_cases
 from bywire.studies.store import Origin, StudyStore
@@ -38,13 +38,13 @@ class Completed:
     damaged: int
 
 
-def _workers_on_device(workers: int | None) -> int | None:
+def _allowed_workers(workers: int | None, chunks: int) -> int | None:
     """Return the number of processes on the graphics processor, or fail if there is none.
 
     A copy of this process looks for it if workers will be copies too, because copies of a process
     that has used the driver cannot use it.
     """
-    if may_copy():
+    if workers_on_device(workers, chunks) > 1 and may_copy():
         with processes_with_brakes(1, "check the driver") as pool:
             label = pool.submit(_exclusive_device).result()
     else:
@@ -112,11 +112,17 @@ def complete(
     until = time.monotonic() + plan.time
     require_workers(workers, cluster, plan.bench.engine)
     if plan.bench.engine == CUDA:
-        workers = _workers_on_device(workers)  # fails here, before the folder is created
-    store.open(plan, origin)
+        workers = _allowed_workers(workers, plan.chunks)  # fails here, before the folder is created
+    claim: Callable[[], object] = partial(store.open, plan, origin)
+    # The advice to resume after a device's failure needs a folder.
+    if store.folder.exists() or plan.sought is not None or plan.bench.engine == CUDA:
+        claim()
+        claim = tuple
     try:
-        return _completed(plan, store, workers, cluster, progress, meanwhile, until)
+        return _completed(plan, store, workers, cluster, progress, (claim, meanwhile), until)
     except DeviceError as error:
+        if not store.folder.exists():
+            raise
         kept = f"Finished chunks are saved: type '{store.resume_command}' to continue"
         raise error.reworded(f"{error}. {kept}") from None
 
@@ -127,10 +133,14 @@ def _completed(
     workers: int | None,
     cluster: str,
     progress: Progress,
-    meanwhile: Callable[[], object],
+    meanwhile: Sequence[Callable[[], object]],
     until: float,
 ) -> Completed:
-    """Compute the bench itself and the missing chunks; see `complete`."""
+    """Compute the bench itself and the missing chunks; see `complete`.
+
+    ``meanwhile``: called before the first chunk is stored. For a new folder, the first function
+    claims it, which takes as long as several chunks because the identity covers all definitions.
+    """
     damaged = store.drop_damaged()
     itself = partial(running.run, plan.bench, estimate_error=True)
     if plan.sought is not None:
@@ -151,7 +161,8 @@ def _completed(
     with executor.opened(plan) as compute:
         nominal_run = compute.beside(itself)
         computed = compute(missing)
-        meanwhile()
+        for each in meanwhile:
+            each()
         for count, (chunk, columns) in enumerate(computed, 1):
             store.write(chunk, columns, plan.column_units)
             progress(label, (done + count) / plan.chunks)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -28,7 +28,7 @@ from bywire.studies.designs import WORST
 from bywire.studies.findings import Findings
 from bywire.studies.meant_study import RECORD
 from bywire.studies.plan import StudyPlan
-from bywire.studies.store import CHOICE, StudyStore, case_bench
+from bywire.studies.store import CASE, CHOICE, FAILURE, StudyStore, case_bench
 
 _EDGES = (0.01, 0.25)
 """probabilities of the quantiles of the probing cases; the opposite quantiles also count"""
@@ -176,25 +176,48 @@ def error_check(findings: Findings, nominal: Result) -> ErrorCheck | None:
     choice = plan.bench.choice
     if choice is None:
         return None
-    rows = [k for k in spread_over(range(findings.count), _CHECKED) if findings.has_result(k)]
-    if not rows:
+    names = list(plan.bench.limits or findings.units)
+    varied = [name for v in plan.varied for name in (v.name, *v.together)]
+    cases = _checked_cases(findings, [*varied, *names])
+    if not cases:
         return None
-    names = plan.bench.limits or findings.units
-    nominal_values = {kpi.name: kpi.value for kpi in nominal.kpis}
+    at_start = {kpi.name: kpi.value for kpi in nominal.kpis}
     here = Figures(
-        {n: np.array([nominal_values[n], *(findings.row(k)[n] for k in rows)]) for n in names},
-        np.zeros(1 + len(rows), dtype=bool),
+        {n: np.array([at_start[n], *(case[n] for case in cases)]) for n in names},
+        np.zeros(1 + len(cases), dtype=bool),
     )
     others: dict[float, Figures] = {}
     for factor, bench in _other_steps(plan.bench):
         finer = replace(plan, bench=bench)
-        cases = [case_bench(finer, findings.number(k), findings.values(k)) for k in rows]
+        benches = [_case(finer, case[CASE], {n: case[n] for n in varied}) for case in cases]
         try:
-            others[factor] = figures_of([bench, *cases])
+            others[factor] = figures_of([bench, *benches])
         except RunError:
             continue
     errors = errors_of(plan.bench, here, others, scales_of(plan.bench, nominal.recordings))
-    return ErrorCheck(choice.stated, {n: each[1:] for n, each in errors.each.items()}, len(rows))
+    return ErrorCheck(choice.stated, {n: each[1:] for n, each in errors.each.items()}, len(cases))
+
+
+def _checked_cases(findings: Findings, names: Sequence[str]) -> list[dict[str, Any]]:
+    """Return cases with a result, spread over all cases: the named columns, and the number."""
+    rows = np.array(spread_over(range(findings.count), _CHECKED), dtype=int)
+    cases: list[dict[str, Any]] = []
+    begin = 0
+    for block in findings.blocks([CASE, FAILURE, *names]):
+        size = len(block[CASE])
+        for row in (rows[(rows >= begin) & (rows < begin + size)] - begin).tolist():
+            if not block[FAILURE][row]:
+                columns = {n: np.asarray(block[n])[row : row + 1] for n in (CASE, *names)}
+                cases.append({n: column.tolist()[0] for n, column in columns.items()})
+        begin += size
+    return cases
+
+
+def _case(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench | None:
+    try:
+        return case_bench(plan, number, values)
+    except InputError:  # the step does not divide a sample time of this case
+        return None
 
 
 def _other_steps(bench: Bench) -> Iterator[tuple[float, Bench]]:

@@ -293,6 +293,11 @@ def _read_chunk(
     return columns, table.schema.metadata or {}
 
 
+def release_memory() -> None:
+    """Release the memory that pyarrow keeps for its next file, 20 MB after files of groups."""
+    library("pyarrow", *_WHAT).default_memory_pool().release_unused()
+
+
 # --- The folder
 # An existing chunk is never recomputed. Each file is written completely or not at all, so that a
 # killed process loses only its current chunks.
@@ -422,14 +427,14 @@ class StudyStore(PieceFolder):
 
     def listed(self) -> tuple[set[int], set[int]]:
         """Return the numbers of chunks with their own file, and of groups with a single file."""
-        groups = set()
+        # Before the groups, since another process may merge files at this moment.
+        single, groups = super().finished(), set()
         for path in (self.folder / _CHUNKS).glob("*-*.parquet"):
             if match := _GROUP_STEM.fullmatch(path.stem):
                 first, last = map(int, match.groups())
                 if first % GROUP == 0 and last == first + GROUP - 1:
                     groups.add(first // GROUP)
-        # Afterwards, since another process may replace the files of a group at this moment.
-        return super().finished(), groups
+        return single, groups
 
     def finished(self) -> set[int]:
         """Return the numbers of the stored chunks."""
@@ -453,13 +458,15 @@ class StudyStore(PieceFolder):
         damaged = 0
         single, groups = self.listed()
         for group in sorted(groups):
+            parts = single.intersection(_chunks_of(group))  # left by a killed process
             try:
                 self.group(group)
             except FileError:
                 self.group_path(group).unlink()
-                damaged += GROUP
-            else:  # a killed process may have left files that this one replaces
-                self._remove(single.intersection(_chunks_of(group)))
+                damaged += GROUP - len(parts)
+            else:
+                self._remove(parts)
+                single -= parts
         self._single.clear()
         for chunk in sorted(single):
             try:

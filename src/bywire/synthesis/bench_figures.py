@@ -19,9 +19,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-import xarray as xr
 
 from bywire.analysis.crossings import Margin, fall, measured_margin
 from bywire.analysis.linear.corners import taking
@@ -31,11 +31,15 @@ from bywire.analysis.response.sweep import Sweep, common_interval, complex_value
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis.families import evaluate
+from bywire.bench.recording import Rows
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _POINTS = 12
 _BELOW, _ABOVE = 4.0, 3.0  # range of frequencies, relative to the target
@@ -363,13 +367,11 @@ def _steps(
     ensemble = simulate_ensemble(run, kept, [setting.signal])
     unit = signals_of(case.model.Output)[setting.signal].unit
     height = abs((setting.end or 0.0) - (setting.start or 0.0))
+    time = ensemble.time - case.settle
     rows = []
     for values in ensemble[setting.signal]:
-        recording = xr.Dataset(
-            {setting.signal: ("time", values, {"units": unit})},
-            coords={"time": ("time", ensemble.time - case.settle, {"units": "s"})},
-        )
-        kpis = evaluate("step_response", recording, setting)
+        rows_of_set = Rows(time, {setting.signal: values}, {setting.signal: {"units": unit}})
+        kpis = evaluate("step_response", cast("xr.Dataset", rows_of_set), setting)
         row = {name: kpis[name].value for name in STEP_FIGURES}
         row["steady_state_error"] *= 100.0 / height if height else math.nan
         missing = [name for name in STEP_FIGURES if math.isnan(row[name])]

@@ -206,8 +206,7 @@ def magnitudes(point: SmoothPoint) -> Array:
     that its direction, which determines its side, does not change.
     """
     model = point.model
-    known = [*map(signals_of, (model.State, model.Memory, model.Stimulus))]
-    nominal = [abs(each.nominal) for signals in known for each in signals.values()]
+    nominal = _nominal(model.State, model.Memory, model.Stimulus)
     values = np.abs(np.concatenate([point.state, point.memory, point.stimulus]))
     usual = np.maximum(nominal, values)
     for name, direction in zip(model.frictions, point.directions, strict=True):
@@ -215,6 +214,12 @@ def magnitudes(point: SmoothPoint) -> Array:
             k = model.State._fields.index(name)
             usual[k] = min(usual[k], 0.5 * values[k] / REACH)
     return np.asarray(usual)
+
+
+@lru_cache(maxsize=64)
+def _nominal(*kinds: type) -> tuple[float, ...]:
+    """Return the usual magnitude of each signal."""
+    return tuple(abs(each.nominal) for kind in kinds for each in signals_of(kind).values())
 
 
 def beside_point(point: SmoothPoint, free: NDArray[np.bool_]) -> Array:

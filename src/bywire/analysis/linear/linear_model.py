@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -298,6 +299,10 @@ class LinearModel:
 
     def effective(self) -> list[int]:
         """Return the states that inputs affect and that affect outputs."""
+        return list(self._effective)
+
+    @cached_property
+    def _effective(self) -> tuple[int, ...]:
         forward, backward = self.B.any(axis=1), self.C.any(axis=0)
         coupled = self.A != 0
         for _ in range(len(self.states)):
@@ -306,7 +311,7 @@ class LinearModel:
             backward = backward | coupled[backward].any(axis=0)
             if np.count_nonzero(forward) + np.count_nonzero(backward) == reached:
                 break
-        return np.flatnonzero(forward & backward).tolist()
+        return tuple(np.flatnonzero(forward & backward).tolist())
 
 
 def _places(kind: str, names: Sequence[str], known: tuple[str, ...]) -> list[int]:

@@ -338,7 +338,7 @@ def _on_device(
 
     None for other rows, and if a signal that the family needs is missing.
     """
-    if rows.held is None:
+    if rows.held is None or not family.is_on_device:
         return None
     wanted = {name: getattr(settings[0], name) for name in family.signals}
     names = [each if each in rows.held.names else None for each in wanted.values()]
@@ -352,4 +352,5 @@ def _on_device(
     try:
         return family.on_device(rows["time"].values, rows.held, names, settings), level
     except CompilerError:  # this machine's processor computes the same figures
+        family.is_on_device = False
         return None

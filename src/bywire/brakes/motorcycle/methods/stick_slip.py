@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,15 +143,20 @@ class Shot:
     seen: int
     steep: int
 
-    @property
+    @cached_property
     def interval(self) -> float:
         """Sample time [s]."""
         return float(f"{self.time[1] - self.time[0]:.9g}")
 
-    @property
+    @cached_property
     def clock(self) -> Array:
         """Time since the first row [s], shape (n,)."""
         return np.arange(self.time.size, dtype=float) * self.interval
+
+    @cached_property
+    def half_way(self) -> float:
+        """Time since the first row [s] at which the slip has covered half of its travel."""
+        return _half_way(self.clock, self.pressure, self.slip)
 
 
 def cut_out(
@@ -296,37 +301,38 @@ def overlaid(shot: Shot, p: Array) -> tuple[Array, Array, float]:
     p
         Computed pressure [Pa], shape (n,); shifted in time for the best fit.
     """
-    shift = _best_shift(shot, p, shot.time.size)
-    r, v = _laid_over(shot, p, shift)
+    rate = np.gradient(p, shot.interval)
+    shift = _best_shift(shot, p, rate, shot.time.size)
+    r, v = _laid_over(shot, p, rate, shift, shot.time.size)
     return r, v, shift
 
 
-def _best_shift(shot: Shot, p: Array, rows: int) -> float:
+def _best_shift(shot: Shot, p: Array, rate: Array, rows: int) -> float:
     """Return the delay [s] of the computed slip that fits the measured one best (Gauss-Newton).
 
-    ``rows``: number of rows to compare, starting with the first.
+    ``rate``: rate of the computed pressure [Pa/s]; ``rows``: number of rows to compare, starting
+    with the first.
     """
-    t = shot.clock
-    shift = _half_way(t, shot.pressure, shot.slip) - _half_way(t, p, shot.slip)
+    shift = shot.half_way - _half_way(shot.clock, p, shot.slip)
     for _ in range(_ROUNDS):
-        r, v = (part[:rows] for part in _laid_over(shot, p, shift))
+        r, v = _laid_over(shot, p, rate, shift, rows)
         size = float(v @ v)
         if size == 0.0:
             break
         change = float(v @ r) / size
-        shift += float(np.clip(change, -_LEAD, _LEAD))
+        shift += min(max(change, -_LEAD), _LEAD)
         if abs(change) < 1e-9:
             break
     return shift
 
 
-def _laid_over(shot: Shot, p: Array, shift: float) -> tuple[Array, Array]:
+def _laid_over(shot: Shot, p: Array, rate: Array, shift: float, rows: int) -> tuple[Array, Array]:
     """Return computed (delayed by ``shift``) minus measured pressure, and the computed speed."""
     t = shot.clock
-    at = t - shift
-    v = np.interp(at, t, np.gradient(p, shot.interval))
+    at = t[:rows] - shift
+    v = np.interp(at, t, rate)
     v[(at <= 0.0) | (at >= t[-1])] = 0.0
-    return np.interp(at, t, p) - shot.pressure, v
+    return np.interp(at, t, p) - shot.pressure[:rows], v
 
 
 def _half_way(t: Array, p: Array, slip: Slip) -> float:
@@ -393,7 +399,7 @@ def _driven_by(ramp: Run, shot: Shot, current: float, zero: float) -> Driven:
     for _ in range(_ALIGNED):
         computed = simulate(sampled, ("p_mc", "i", "omega"))
         p, i = computed["p_mc"], _moving_mean(computed["i"], width)
-        shift = _best_shift(shot, p, shot.steep)
+        shift = _best_shift(shot, p, np.gradient(p, shot.interval), shot.steep)
         rests = max(int(np.argmax(computed["omega"] != 0.0)) - 1, 0)
         onset = float(shot.clock[rests] + (current - computed["i"][rests]) / shot.rate)
         travel = np.abs(p - p[0])
@@ -483,6 +489,7 @@ class Shooting:
         self.count = len(self.names)
         self.model, self.step = MotorcycleBrake(), step
         self._error = EquationError(Equation(self.model, "omega", "alpha"), self._source, unknowns)
+        self._at_breakaway: dict[tuple[float, int], Array] = {}
 
     def breakaway(self, rest: float, direction: int, values: Array) -> tuple[float, Array]:
         """Return the breakaway current [A] from a rest [Pa], and its derivatives.
@@ -490,12 +497,14 @@ class Shooting:
         At this current, the motor, pressure and breakaway torques balance. The equation of motion
         at standstill is affine in the current.
         """
-        columns = self._error.at(
-            state_at(max(rest, 0.0), self._source)._replace(omega=direction * 1e-12),
-            memory_at(max(rest, 0.0), self._source),
-            "i_source",
-            (0.0, 1.0),
-        )
+        columns = self._at_breakaway.get((rest, direction))
+        if columns is None:  # the same in every evaluation
+            columns = self._at_breakaway[rest, direction] = self._error.at(
+                state_at(max(rest, 0.0), self._source)._replace(omega=direction * 1e-12),
+                memory_at(max(rest, 0.0), self._source),
+                "i_source",
+                (0.0, 1.0),
+            )
         e, slopes = self._error(columns, values)
         per_ampere = e[1] - e[0]
         return -e[0] / per_ampere, -slopes[0] / per_ampere
@@ -555,7 +564,9 @@ class Shooting:
         by_parameters, all_along = computed.derivatives[:, 0, :-1], computed.derivatives[:, 0, -1]
         slopes = by_parameters + np.outer(all_along - answer, current_slopes)
         at = shot.clock - shift
-        kept = np.column_stack([np.interp(at, shot.clock, c) for c in (*slopes.T, answer)])
+        kept = np.zeros((p.size, self.count + 1))
+        for k, slope in enumerate((*slopes.T, answer) if driven is not None else slopes.T):
+            kept[:, k] = np.interp(at, shot.clock, slope)
         kept[at < 0.0] = 0.0
         shift_slopes = (v @ kept) / max(float(v @ v), 1e-300)
         J = kept - np.outer(v, shift_slopes)
