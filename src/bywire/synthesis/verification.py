@@ -556,8 +556,8 @@ def corners_of(problem: Problem, gains: Mapping[str, float]) -> list[LinearCase]
     If there are more than `MOST`, only those that are worst in the linear models are returned. The
     linear models contain no dry friction. If they do not distinguish the corners, the bench does.
 
-    Drawn models are no corners if a requirement has a probability, because some of them may then
-    miss it. A study of the bench tests such requirements.
+    If a requirement has a probability, drawn models are not included, because some of them may miss
+    it. A study of the bench tests such requirements.
 
     Parameters
     ----------
