@@ -55,7 +55,7 @@ rise_time = "<= 100 ms with 95 %"
 _STATED = ("0.1 %", "1 %")  # numerical errors that the bench of a study states
 _COMMANDS = 2  # number of commands, of which the faster one counts
 _CASES_AT = CHUNKS * CHUNK  # cases that are computed together
-_ROUNDS = 3
+_ROUNDS = 6
 _WARM = 4  # warm-up chunks of each process
 _STEADY = 4.0  # s of measurement: a cluster's last tasks take half a second
 _TURNS = 3  # turns of processes and cluster, of which the fastest counts

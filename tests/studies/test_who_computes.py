@@ -165,3 +165,16 @@ def test_a_batch_for_a_graphics_processor_fits_into_this_machines_memory(study, 
     assert [executor._fitting(plan, 100, workers) for workers in (1, 2, 20)] == [6, 3, 1]
     assert executor._fitting(plan, 2, 1) == 2
     assert executor._fitting(plan, 7, 1) == 4  # and then 3, instead of 6 and 1
+
+
+def test_tasks_grow_to_their_target_and_shrink_towards_the_end():
+    tasks, sizes = executor._Tasks(range(40), workers=2, seconds=0.2, most=4), []
+    while task := tasks.next():
+        sizes.append(len(task))
+        tasks.measured((0.08 * len(task), [(n, {}) for n in task]))  # 0.08 s for each chunk
+    assert sizes[:4] == [1, 2, 2, 2]
+    assert sizes[-3:] == [1, 1, 1]
+    assert sum(sizes) == 40
+    quick = executor._Tasks(range(40), workers=1, seconds=0.2, most=4)
+    quick.measured((1e-3, [(0, {})]))
+    assert len(quick.next()) == 4

@@ -114,7 +114,8 @@ def complete(
     if plan.bench.engine == CUDA:
         workers = _allowed_workers(workers, plan.chunks)  # fails here, before the folder is created
     claim: Callable[[], object] = partial(store.open, plan, origin)
-    if store.folder.exists() or plan.sought is not None:
+    # The advice to resume after a device's failure needs a folder.
+    if store.folder.exists() or plan.sought is not None or plan.bench.engine == CUDA:
         claim()
         claim = tuple
     try:

@@ -293,6 +293,11 @@ def _read_chunk(
     return columns, table.schema.metadata or {}
 
 
+def release_memory() -> None:
+    """Release the memory that pyarrow keeps for its next file, 20 MB after files of groups."""
+    library("pyarrow", *_WHAT).default_memory_pool().release_unused()
+
+
 # --- The folder
 # An existing chunk is never recomputed. Each file is written completely or not at all, so that a
 # killed process loses only its current chunks.

@@ -15,7 +15,7 @@ import numpy as np
 
 from bywire.core.errors import FileError
 from bywire.studies.plan import CHUNK, StudyPlan
-from bywire.studies.store import GROUP, Columns, StudyStore
+from bywire.studies.store import GROUP, Columns, StudyStore, release_memory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,6 +81,7 @@ class StoredCases:
                 gathered, count = [], 0
         if gathered:
             yield _joined(gathered)
+        release_memory()
 
     def row(self, row: int) -> Columns:
         """Return all columns of a case, by its row, shape (1,) each.

@@ -46,13 +46,11 @@ from bywire.bench.kpis.translator import (
 from bywire.core.errors import CompilerError, ModelError
 from bywire.core.typing import Array
 from bywire.simulation.compiler import find_compiler, load_library
-from bywire.simulation.cuda import THREADS
-
-if TYPE_CHECKING:
-    from bywire.bench.recording import Held
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from bywire.bench.recording import Held
 
 NO_NUMBER = "its value is not a finite number"
 _NO_FIGURE = Undefined(NO_NUMBER)
@@ -223,6 +221,8 @@ class LoopFamily:
     @cached_property
     def cuda_text(self) -> str:
         """The family's CUDA C, with a kernel that has one thread for each case."""
+        from bywire.simulation.cuda import THREADS  # loads all of the code generation
+
         head = f"""KERNEL void __launch_bounds__({THREADS}) {self.entry}(const int64_t *sizes,
     {_ARGUMENTS}) {{
   const int64_t cases = sizes[0], n = sizes[1], first = sizes[2];
@@ -414,6 +414,8 @@ class LoopFamily:
 
         ``signals``: names of the signals in the order of ``self.signals``; None for a missing one.
         """
+        from bywire.simulation.cuda import THREADS  # loads all of the code generation
+
         cases, n, device = len(settings), t.size, held.rows.device
         places = [(0, 0) if each is None else (held.address(each), n) for each in signals]
         given, made = self._arrays(t, places, settings)
