@@ -23,15 +23,15 @@ class Judged(EqualWhereUndefined):
     limit
         Text of the limit; empty without one.
     value, unit
-        The figure at its worst, in its unit; NaN if it is undefined, or without a limit.
+        Worst value of the figure, in its unit; NaN if it is undefined, or without a limit.
     error
         Bound of its numerical or statistical error, in its unit; NaN if it is unknown.
     room
         Distance between the value and the limit, in the figure's unit; negative beyond the limit.
     at
-        Where the figure is the worst; empty without a range.
+        Where the worst value occurs; empty without a range.
     note
-        Reason for a verdict that is not ``met``, or a probability with its interval.
+        Reason for a verdict other than ``met``, or a probability with its interval.
     """
 
     outcome: Outcome
@@ -102,7 +102,7 @@ def judge_limit(limit: Limit, figures: Sequence[FigureAt]) -> Judged:
     )
     note = worst.kpi.note if math.isnan(verdict.value) else ""
     if outcome == "undecided" and not note:
-        note = "closer to the limit than its error"
+        note = "the difference from the limit is smaller than the error"
     return Judged(
         outcome,
         text,

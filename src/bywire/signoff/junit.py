@@ -23,7 +23,7 @@ class TestCase:
     outcome
         The verdict.
     message
-        Reason for a verdict that is not ``met``, in one line.
+        Reason for a verdict other than ``met``, in one line.
     lines
         Text of the requirement and its evidence.
     """

@@ -26,7 +26,7 @@ class Task(ABC):
 
     @property
     def is_parallel(self) -> bool:
-        """Whether the computation itself uses all cores, so that no other one runs beside it."""
+        """Whether the computation itself uses all cores, and therefore runs alone."""
         return False
 
     @property
@@ -37,7 +37,7 @@ class Task(ABC):
     @property
     @abstractmethod
     def title(self) -> str:
-        """One line that tells it apart from the others, with the user's words."""
+        """One line that identifies the task for the user."""
 
     @property
     @abstractmethod
@@ -51,7 +51,7 @@ class Task(ABC):
 
     @property
     def shelf(self) -> str:
-        """Digest by which its folder is named. Computations that continue each other share it."""
+        """Digest in its folder's name. Computations that continue each other share this digest."""
         return self.digest
 
     @abstractmethod
@@ -65,7 +65,7 @@ class Task(ABC):
         """
 
     def with_limits(self, limits: Sequence[Limit]) -> Task:
-        """Return the task with all limits that the file places on it.
+        """Return the task with all limits that the file sets for it.
 
         Raises
         ------

@@ -17,7 +17,7 @@ from bywire.signoff.statements import Place, Statement, placed, require_id, requ
 
 Arguments = Mapping[str, Any]
 Readers = Mapping[str, Callable[[str, Arguments, Path], Task]]
-"""kinds of evidence: ``read(subject, arguments, folder)`` by the key that names the subject"""
+"""kinds of evidence: ``read(subject, arguments, folder)`` by the key that contains the subject"""
 
 _REQUIREMENT, _ASSUMPTION, _EVIDENCE = "requirement", "assumption", "evidence"
 _OWN = ("shows", "limit", "note")
@@ -57,7 +57,7 @@ def read_signoff(path: str | Path, readers: Readers) -> SignOffPlan:
     Parameters
     ----------
     path
-        TOML file; see ``docs/signoff.md``.
+        TOML file (see ``docs/signoff.md``).
     readers
         Kinds of evidence.
 
@@ -66,7 +66,7 @@ def read_signoff(path: str | Path, readers: Readers) -> SignOffPlan:
     FileError
         If the file cannot be read or is not valid TOML.
     InputError
-        For any invalid entry, with file and line in front.
+        For any invalid entry. The message begins with the file and the line.
     """
     file = Path(path)
     content = read_toml(file, "sign-off file")
@@ -83,8 +83,8 @@ def read_signoff(path: str | Path, readers: Readers) -> SignOffPlan:
         statements = [*imported.statements, *statements]
     if not statements:
         raise ParameterError(
-            f"{file} contains no requirement. Add a [[requirement]] with id and text, or name a "
-            'file with requirements = "FILE"',
+            f"{file} contains no requirement. Add a [[requirement]] with an id and a text, or "
+            'specify a requirements file with requirements = "FILE"',
             name="requirement",
         )
     require_sound(statements)
@@ -104,13 +104,13 @@ def read_signoff(path: str | Path, readers: Readers) -> SignOffPlan:
 
 
 def _imported(read: SignOffFile, file: Path) -> Imported | None:
-    """Return the requirements of the file that a sign-off file names, or None."""
+    """Return the requirements from the file that a sign-off file specifies, or None."""
     if read.requirements:
         return imported_from(file.parent / read.requirements, read.attributes, read.only)
     for key in ("attributes", "only"):
         if key in read.given:
             raise ParameterError(
-                f"{file}: [{key}] needs a file with requirements. Add requirements = "
+                f"{file}: [{key}] needs a requirements file. Add requirements = "
                 '"FILE.csv" or "FILE.reqif"',
                 name=key,
             )
@@ -125,7 +125,7 @@ def _entries(
         return
     if not isinstance(value, Sequence) or not all(isinstance(each, Mapping) for each in value):
         raise ParameterError(
-            f"{file}: [[{name}]] must be a list. Write it in double brackets, once per entry",
+            f"{file}: [[{name}]] must be a list. Write [[{name}]] once for each entry",
             name=f"[[{name}]]",
         )
     known = lines.get(name, ())
@@ -162,7 +162,7 @@ def _evidence(
             if unknown:
                 raise unknown_name("kind of [[evidence]]", unknown[0], readers)
             raise ParameterError(
-                "[[evidence]] does not name what shows the requirement. Add one of these keys: "
+                "[[evidence]] does not specify a kind of evidence. Add one of these keys: "
                 f"{', '.join(readers)}",
                 name="[[evidence]]",
                 valid=", ".join(readers),
@@ -170,7 +170,8 @@ def _evidence(
         kind = _kind(kinds)
         subject = entry[kind]
         if not isinstance(subject, str) or not subject.strip():
-            raise not_valid(f"[[evidence]] {kind}", quoted(subject), "a name or a file in quotes")
+            valid = "a name or a file in quotation marks"
+            raise not_valid(f"[[evidence]] {kind}", quoted(subject), valid)
         shows = _texts(entry.get("shows", ()), "shows")
         known = [each.id for each in statements]
         for id in shows:
@@ -181,7 +182,7 @@ def _evidence(
         limits = tuple(task.limit(text) for text in _texts(entry.get("limit", ()), "limit"))
         note = entry.get("note", "")
         if not isinstance(note, str):
-            raise not_valid("[[evidence]] note", quoted(note), "a text in quotes")
+            raise not_valid("[[evidence]] note", quoted(note), "a string in quotation marks")
     return Evidence(task, limits, shows, note, place)
 
 
@@ -202,8 +203,8 @@ def _together(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
             other = first.setdefault(task.shelf, replace(each, task=task))
             if other.task.digest != task.digest:
                 raise ParameterError(
-                    f"[[evidence]] repeats the computation of {other.place} with other settings. "
-                    "Use the same settings in both, or remove one of them",
+                    f"[[evidence]] repeats the computation of {other.place} with different "
+                    "settings. Use the same settings in both entries, or remove one of them",
                     name="[[evidence]]",
                     value=task.title,
                 )
@@ -212,7 +213,7 @@ def _together(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
 
 
 def _kind(kinds: Sequence[str]) -> str:
-    """Return the key that names the subject; a record also has a bench, as an argument."""
+    """Return the key that contains the subject; a record also has a bench, as an argument."""
     for each in kinds:
         if set(kinds) <= {each, *_ARGUMENTS.get(each, ())}:
             return each
@@ -237,5 +238,5 @@ def _texts(value: Any, key: str) -> tuple[str, ...]:
     if not isinstance(values, Sequence) or not all(
         isinstance(each, str) and each.strip() for each in values
     ):
-        raise not_valid(f"[[evidence]] {key}", quoted(value), "a text or a list of texts")
+        raise not_valid(f"[[evidence]] {key}", quoted(value), "a string or a list of strings")
     return tuple(values)

@@ -32,7 +32,7 @@ class Place:
 
 
 NOWHERE = Place(Path())
-"""place of what comes from no file"""
+"""place of a statement that does not come from a file"""
 
 
 @contextmanager
@@ -84,13 +84,11 @@ def require_id(id: str) -> None:
         With the id.
     """
     if len(id) > _LONGEST or not id.isprintable() or id != id.strip():
-        raise not_valid(
-            "id", quoted(id), f"printable text in one line of at most {_LONGEST} characters"
-        )
+        raise not_valid("id", quoted(id), f"one line of at most {_LONGEST} printable characters")
 
 
 def require_sound(statements: Sequence[Statement]) -> None:
-    """Reject two statements with one name, unknown assumptions, and circles of assumptions.
+    """Reject statements with the same id, unknown assumptions, and circular assumptions.
 
     Raises
     ------
@@ -127,8 +125,8 @@ def _require_no_circle(
     if each.id in above:
         circle = " -> ".join((*above[above.index(each.id) :], each.id))
         raise ParameterError(
-            f"{each.place}: assumptions rely on each other in a circle ({circle}). Remove one of "
-            "these entries of assumes",
+            f"{each.place}: assumptions rely on each other circularly ({circle}). Remove one of "
+            "these ids from assumes",
             name="assumes",
             value=circle,
         )

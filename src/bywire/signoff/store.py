@@ -1,4 +1,4 @@
-"""Stored evidence: figures and verdicts of each finished computation, beside its own result."""
+"""Stored evidence: figures and verdicts of each finished computation, with its own result."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class EvidenceStore:
         return [kept for place in places if (kept := _read(place.parent)) is not None]
 
     def keep(self, task: Task, computed: Computed) -> None:
-        """Store the evidence of a task beside its result, completely or not at all.
+        """Store the evidence of a task atomically, in the folder of its result.
 
         Raises
         ------

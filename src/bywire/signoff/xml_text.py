@@ -9,5 +9,5 @@ _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 
 
 def xml_text(text: str) -> str:
-    """Return text in which the replacement character stands for what XML 1.0 does not allow."""
+    """Return text with a replacement character for each character that XML 1.0 does not allow."""
     return _FORBIDDEN.sub("\N{REPLACEMENT CHARACTER}", text)

@@ -48,8 +48,9 @@ def run_procedure(
     progress
         Called with the name of a stop and the completed fraction, 0 to 1.
     estimate_error
-        Whether to rerun stops with limits with other step sizes to estimate the numerical error of
-        key figures. If a key figure is closer to its limit than this error, the limit is undecided.
+        Whether to estimate the numerical error of key figures by rerunning stops that have limits
+        with other steps. A limit is undecided if the difference between the key figure and the
+        limit is smaller than this error.
 
     Returns
     -------

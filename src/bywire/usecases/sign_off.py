@@ -15,14 +15,17 @@ SignOffFile = Annotated[
 ]
 SignOffFolder = Annotated[
     str | Path | None,
-    Ask("Folder of the sign-off. Default: the file's name without its suffix.", is_folder=True),
+    Ask("Sign-off folder. Default: the file's name without its suffix.", is_folder=True),
 ]
 IsChanged = Annotated[
     bool, Ask("Only show the evidence to compute, and the requirements that it affects.")
 ]
 Since = Annotated[
     Path | None,
-    Ask("Folder or signoff.json of an earlier sign-off. Default: the last one in the folder."),
+    Ask(
+        "Folder or signoff.json of an earlier sign-off with which the document compares this one. "
+        "Default: the last sign-off in the folder."
+    ),
 ]
 
 
@@ -64,17 +67,17 @@ def sign_off(
 ) -> "SignOff | Affected":
     """Compute the evidence for a list of requirements, and write one document to sign.
 
-    bywire computes only evidence that is missing in the folder, or whose inputs have changed.
-    Therefore, the same call continues after an interrupt.
+    bywire computes only evidence that is missing from the folder, or whose inputs have changed.
+    After an interruption, the same call therefore continues the sign-off.
 
     Parameters
     ----------
     file
         Sign-off file (see ``docs/signoff.md``).
     out
-        Folder of the sign-off. Default: the file's name without its suffix, in the current folder.
+        Sign-off folder. Default: the file's name without its suffix, in the current folder.
     changed
-        Whether to compute nothing, and to return what a change of the inputs affects.
+        Whether to compute nothing, and only return what changed inputs affect.
     since
         Folder or ``signoff.json`` of an earlier sign-off with which the document compares this one.
         Default: the last sign-off in the folder.

@@ -1,4 +1,4 @@
-"""Values of an ``[[evidence]]``: paths, changes, limits, and digests of what they refer to."""
+"""Values of an ``[[evidence]]`` entry: paths, changes, limits, and digests of files and code."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SUFFIXES = (".py", ".c", ".h", ".toml", ".js")
 
 
 def title_of(kind: str, subject: str, arguments: Mapping[str, Any]) -> str:
-    """Return the words of an entry in one line.
+    """Return the kind, subject and arguments of an entry in one line.
 
     Examples
     --------
@@ -87,20 +87,20 @@ def value_of(argument: Argument, value: Any, folder: Path) -> Any:
         flat = flattened(value)
         for key, each in flat.items():
             if not isinstance(each, str):
-                valid = "a text in quotes, with its unit"
+                valid = "a string in quotation marks, with its unit"
                 raise not_valid(f"{name} {key}", quoted(each), valid)
         return flat
     if kind in ("changes", "pairs", "names", "lines", "files", "things"):
         texts = [value] if isinstance(value, str) else value
         if not isinstance(texts, list) or not all(isinstance(each, str) for each in texts):
-            raise not_valid(name, quoted(value), "a text or a list of texts")
+            raise not_valid(name, quoted(value), "a string or a list of strings")
         if kind in ("files", "things"):
             return [folder / each for each in texts]
         if kind == "names":
             return named(texts, name)
         return texts if kind == "lines" else changes(texts, name)
     if not isinstance(value, str):
-        raise not_valid(name, quoted(value), "a text in quotes")
+        raise not_valid(name, quoted(value), "a string in quotation marks")
     return there(value, argument, folder)
 
 
@@ -170,7 +170,7 @@ def _files(value: Any) -> Iterator[Path]:
         try:
             if (path := Path(value)).is_file():
                 yield path
-        except (OSError, ValueError):  # a text that is no path
+        except (OSError, ValueError):  # a string that is not a path
             return
 
 

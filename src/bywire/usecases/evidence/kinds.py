@@ -66,7 +66,7 @@ class Kind:
         Arguments with fixed values, which a sign-off file cannot specify.
     is_by_source
         Whether the figures also depend on code other than the brake's equations and key figures, so
-        that every change of the source code counts.
+        that every change to the source code changes the digest.
     is_parallel
         Whether the computation itself uses all cores.
     has_report
@@ -293,7 +293,7 @@ class UseCaseTask(Task):
     Parameters
     ----------
     kind, subject, arguments, folder
-        The user's words, and the folder of the sign-off file.
+        Content of the entry, and the folder of the sign-off file.
     asked, read
         The arguments of the use case by name, and what it reads from them.
     """
@@ -312,12 +312,12 @@ class UseCaseTask(Task):
 
     @property
     def origin(self) -> Origin:
-        """The reader with the user's words, for another process."""
+        """The reader and its arguments, for another process."""
         return read_kind, (self.kind, self.subject, self.arguments, self.folder)
 
     @property
     def title(self) -> str:
-        """The user's words in one line."""
+        """The entry in one line."""
         return title_of(self.kind, self.subject, self.arguments)
 
     @cached_property
@@ -338,8 +338,8 @@ class UseCaseTask(Task):
         limited = KINDS[self.kind].limit
         if limited is None:
             raise ParameterError(
-                f"[[evidence]] {self.kind} accepts no limit, because its own checks decide. Remove "
-                "limit",
+                f"[[evidence]] {self.kind} does not accept a limit, because its own checks decide. "
+                "Remove the key limit",
                 name="limit",
                 value=text,
             )

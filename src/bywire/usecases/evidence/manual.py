@@ -38,7 +38,7 @@ class ManualTask(Task):
     entry
         The statement with its file.
     arguments, folder
-        The user's words, and the folder of the sign-off file.
+        Content of the entry, and the folder of the sign-off file.
     """
 
     entry: ManualEntry
@@ -47,12 +47,12 @@ class ManualTask(Task):
 
     @property
     def origin(self) -> Origin:
-        """The reader with the user's words, for another process."""
+        """The reader and its arguments, for another process."""
         return read_manual, (self.entry.what, self.arguments, self.folder)
 
     @property
     def title(self) -> str:
-        """The user's words in one line."""
+        """The entry in one line."""
         return f"manual {self.entry.what}"
 
     @property
@@ -72,7 +72,8 @@ class ManualTask(Task):
     def limit(self, text: str) -> Limit:
         """Return a limit of one of its figures."""
         raise ParameterError(
-            "[[evidence]] manual accepts no limit, because the person decides. Remove limit",
+            "[[evidence]] manual does not accept a limit, because the person decides. Remove the "
+            "key limit",
             name="limit",
             value=text,
         )
@@ -101,8 +102,8 @@ def read_manual(what: str, arguments: Mapping[str, Any], folder: Path) -> Manual
     if isinstance(path, str) and "sha256" not in arguments:
         require_file(folder / path)
         raise ParameterError(
-            "[[evidence]] manual needs the digest of its file, so that a later change is noticed. "
-            f'Add sha256 = "{file_digest(folder / path)}"',
+            "[[evidence]] manual needs the digest of its file, so that bywire can detect a later "
+            f'change. Add sha256 = "{file_digest(folder / path)}"',
             name="sha256",
         )
     section = ManualSection.read(arguments, "[[evidence]] manual")
@@ -111,7 +112,7 @@ def read_manual(what: str, arguments: Mapping[str, Any], folder: Path) -> Manual
     found = file_digest(file)
     if found != section.sha256.lower():
         raise FileError(
-            f"{file} has changed: its SHA-256 digest is {found}, not {section.sha256}. Inspect the "
+            f"{file} has changed. Its SHA-256 digest is {found}, not {section.sha256}. Inspect the "
             "file again, and update person, date and sha256",
             name=str(file),
             value=found,

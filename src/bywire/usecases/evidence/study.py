@@ -34,7 +34,7 @@ from bywire.usecases.evidence.entry import (
 )
 
 KEYS = ("set", "cases")
-"""keys of a study beside those of every ``[[evidence]]``"""
+"""keys of a study in addition to those of every ``[[evidence]]``"""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class StudyTask(Task):
     Parameters
     ----------
     subject, arguments, folder
-        The user's words, and the folder of the sign-off file.
+        Content of the entry, and the folder of the sign-off file.
     file, changes
         The study file, and changes to its bench.
     plan
@@ -68,12 +68,12 @@ class StudyTask(Task):
 
     @property
     def origin(self) -> Origin:
-        """The reader with the user's words, for another process."""
+        """The reader and its arguments, for another process."""
         return read_study_task, (self.subject, self.arguments, self.folder)
 
     @property
     def title(self) -> str:
-        """The user's words in one line."""
+        """The entry in one line."""
         return title_of("study", self.subject, self.arguments)
 
     @cached_property
@@ -117,8 +117,8 @@ class StudyTask(Task):
         for name in figures:
             if figures.count(name) > 1:
                 raise ParameterError(
-                    f"the same study has several limits on {name}. A study judges each key figure "
-                    "once. Copy the study file for the second limit",
+                    f"the same study has several limits on {name}, but a study judges each key "
+                    "figure only once. Copy the study file for the second limit",
                     name=name,
                 )
         return replace(self, limits=tuple(limits))
@@ -145,10 +145,10 @@ def _judged(run: StudyRun, judgment: Judgment) -> Judged:
             "1",
             estimate.high - estimate.value,
             admitted - estimate.high,
-            note=f"probability of missing it {estimate.value:.2g} ({estimate.low:.2g} to "
+            note=f"probability of missing the limit: {estimate.value:.2g} ({estimate.low:.2g} to "
             f"{estimate.high:.2g}, {failure.runs} cases)",
         )
-    note = f"{share.count} of {share.cases} cases meet it"
+    note = f"{share.count} of {share.cases} cases meet the limit"
     if run.plan.is_sampled:
         interval = f"{100.0 * share.low:.4g} to {100.0 * share.high:.4g} %"
         note += f", {100.0 * run.plan.confidence:g} % interval {interval}"
