@@ -16,18 +16,25 @@ from numpy.typing import NDArray
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.margins import NO_LOOP, figures_at, loop_curve
 from bywire.api import design_parts
-from bywire.api.design_parts import Part, figure_cell, judged_on, verdict_text
+from bywire.api.design_parts import Part, judged_on, verdict_text
+from bywire.api.design_probability import (
+    BenchProbability,
+    Probability,
+    bench_probability,
+    drawn_models,
+    read_probability,
+    require_drawn,
+    require_no_probability,
+)
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
-from bywire.api.study_tables import percent
 from bywire.bench.bench import Bench
-from bywire.bench.changes import OPTION
 from bywire.bench.requirements import Limit
 from bywire.core.callers import option
-from bywire.core.errors import InputError, ParameterError, not_valid, quoted
+from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Progress, silent
-from bywire.core.units import parse, shown
+from bywire.core.units import shown
 from bywire.data.toml_file import read_toml
 from bywire.report.answer import Answer
 from bywire.report.document import (
@@ -42,16 +49,12 @@ from bywire.report.document import (
     Section,
     TableBlock,
 )
-from bywire.report.tables import Cell, text_table
-from bywire.studies.plan import CHUNK, StudyPlan
-from bywire.studies.statistics import Outcome, Share, judged, share
-from bywire.studies.study_file import read_study
+from bywire.studies.statistics import Outcome
 from bywire.synthesis import designer
-from bywire.synthesis.linear_case import LinearCase, cases_of, existing_case, read, require_given
+from bywire.synthesis.linear_case import cases_of, read
 from bywire.synthesis.outcome import (
     Across,
     Design,
-    Judged,
     ScheduleDesign,
     Status,
     bench_text,
@@ -71,222 +74,6 @@ if TYPE_CHECKING:
 
     from bywire.report.loop_curves import DesignCurve
 
-_JUDGES = 512  # additional models for testing the gains
-_MOST = 1000
-
-
-@dataclass(frozen=True)
-class DrawnModels:
-    """Models drawn in the same way as a study draws its cases.
-
-    Parameters
-    ----------
-    study
-        Name of the study.
-    cases
-        Models for which bywire chooses the gains.
-    lacking
-        Number of draws for which no model exists, among those for choosing the gains.
-    judges
-        Additional models for testing the gains. None where no model exists.
-    confidence
-        Confidence level of intervals.
-    """
-
-    study: str
-    cases: tuple[LinearCase, ...]
-    lacking: int
-    judges: tuple[LinearCase | None, ...]
-    confidence: float
-
-
-@dataclass(frozen=True)
-class Probability:
-    """Probability that the gains meet their requirements on linear models.
-
-    Parameters
-    ----------
-    drawn
-        The models.
-    requirements
-        The requirements.
-    judged
-        Number of test models that meet each requirement.
-    wanted
-        Required probability that all requirements are met together, or None.
-    """
-
-    drawn: DrawnModels
-    requirements: tuple[Limit, ...]
-    judged: Judged
-    wanted: float | None
-
-    @property
-    def together(self) -> Share:
-        """Probability of meeting all requirements, with its interval."""
-        return self._share(self.judged.all_met)
-
-    @property
-    def outcome(self) -> Outcome | None:
-        """Verdict on the required probability, or None if none is required."""
-        if self.wanted is None:
-            return None
-        return judged(self.together, self.together, self.wanted)
-
-    def _share(self, count: int) -> Share:
-        return share(count, self.judged.models, self.drawn.confidence)
-
-    def parts(self) -> Sequence[Part]:
-        """Return a table and text lines."""
-        interval = f"{100.0 * self.drawn.confidence:g} % interval"
-        rows: list[tuple[str | Cell, ...]] = [
-            (str(wanted), *self._words(self._share(count)), figure_cell(wanted.figure, worst))
-            for wanted, count, worst in zip(
-                self.requirements, self.judged.met, self.judged.worst, strict=True
-            )
-        ]
-        if len(rows) > 1:
-            rows.append(("all together", *self._words(self.together), "-"))
-        lines: list[Part] = [
-            f"gains chosen for {len(self.drawn.cases)} models drawn from study "
-            f"{self.drawn.study!r}, and tested on {self.judged.models} other models",
-            text_table(["of other models", "met by", "probability", interval, "worst"], rows),
-        ]
-        if self.judged.unstable:
-            lines.append(
-                f"{self.judged.unstable} of these other models are unstable or do not exist. They "
-                "are treated as failing every requirement"
-            )
-        if self.drawn.lacking:
-            lines.append(f"for {self.drawn.lacking} more draws, no model exists")
-        return [*lines, self.verdict] if self.wanted is not None else lines
-
-    @property
-    def verdict(self) -> str:
-        """Verdict on the required probability as text."""
-        wanted = "" if self.wanted is None else f" with {100.0 * self.wanted:.10g} %"
-        return f"all requirements{wanted}: {self.outcome or 'no probability is required'}"
-
-    def _words(self, told: Share) -> tuple[str, str, str]:
-        return (
-            f"{told.count} of {told.cases}",
-            percent(told.value, told),
-            f"{percent(told.low, told)} to {percent(told.high, told)}",
-        )
-
-    def data(self) -> dict[str, Any]:
-        """Return all results as plain data."""
-
-        def said(told: Share) -> dict[str, Any]:
-            return {
-                "met": told.count,
-                "probability": told.value,
-                "low": told.low,
-                "high": told.high,
-            }
-
-        return {
-            "study": self.drawn.study,
-            "designed_for": len(self.drawn.cases),
-            "lacking": self.drawn.lacking,
-            "judged_by": self.judged.models,
-            "unstable": self.judged.unstable,
-            "wanted": self.wanted,
-            "outcome": self.outcome,
-            "all": said(self.together),
-            "requirements": [
-                {"requirement": str(wanted), "worst": worst, **said(self._share(count))}
-                for wanted, count, worst in zip(
-                    self.requirements, self.judged.met, self.judged.worst, strict=True
-                )
-            ],
-        }
-
-
-def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
-    """Draw models of a loop whose parameters vary as in a study file.
-
-    The study's cases, requirements and experiment are ignored.
-
-    Parameters
-    ----------
-    case
-        The loop, its parameters and operating point.
-    file
-        Study file. Relative values in it refer to the values of its bench.
-    count
-        Number of models for which bywire chooses the gains.
-
-    Raises
-    ------
-    InputError
-        If the study file does not fit the loop, the count is invalid, or no model exists.
-    """
-    if not 1 <= count <= _MOST:
-        raise not_valid("drawn", f"{count}", f"1 to {_MOST} models")
-    plan = replace(read_study(file), design="monte-carlo")
-    _require_fitting(case, plan, file)
-    columns = [plan.values(chunk) for chunk in range(-(-(count + _JUDGES) // CHUNK))]
-    models = [
-        _model(case, {name: column[k].item() for name, column in values.items()}, number)
-        for number, (values, k) in enumerate(
-            ((values, k) for values in columns for k in range(CHUNK)), 1
-        )
-    ]
-    designed = tuple(each for each in models[:count] if each is not None)
-    if not designed:
-        raise ParameterError(
-            f"{file}: none of its {count} draws results in a valid model. Narrow its [vary] "
-            "section",
-            name=str(file),
-            value=str(count),
-        )
-    judges = tuple(models[count : count + _JUDGES])
-    return DrawnModels(plan.name, designed, count - len(designed), judges, plan.confidence)
-
-
-def _probability(text: str) -> float | None:
-    """Return the required probability, or None for an empty text.
-
-    Raises
-    ------
-    ParameterError
-        If the text is not a probability between 0 and 100 %.
-    """
-    if not text:
-        return None
-    wanted = parse(text, "1", "probability")
-    if not 0.0 < wanted < 1.0:
-        raise not_valid("probability", quoted(text), "between 0 and 100 %")
-    return wanted
-
-
-def _require_fitting(case: LoopCase, plan: StudyPlan, file: str | Path) -> None:
-    if type(plan.bench.par) is not type(case.par):
-        raise ParameterError(
-            f"{file}: its bench runs {plan.bench.system}, but loop {case.loop.name!r} belongs to "
-            f"{case.loop.assembly}. Choose a study of {case.loop.assembly}",
-            name=str(file),
-            value=plan.bench.system,
-            valid=case.loop.assembly,
-        )
-    for name in (name for v in plan.varied for name in (v.name, *v.together)):
-        if name.startswith(OPTION):
-            raise ParameterError(
-                f"{file}: {name} is an option of the experiment, but the loop has no such option. "
-                "Remove it",
-                name=name,
-            )
-        require_given(case.loop, name)
-
-
-def _model(case: LoopCase, values: Mapping[str, Any], number: int) -> LinearCase | None:
-    try:
-        return existing_case(case.loop, f"drawn model {number}", case.par, values, case.value)
-    except InputError:
-        return None
-
-
 # --- Inputs of a design
 
 Spans = Mapping[str, tuple[float, float]]
@@ -294,7 +81,8 @@ Spans = Mapping[str, tuple[float, float]]
 
 def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Limit, ...]:
     """Return the requirements of a file and of strings such as ``"bandwidth >= 10 Hz"``."""
-    return read([*_from_file(None if file is None else Path(file)), *texts])
+    given = _from_file(None if file is None else Path(file))
+    return read([*given, *texts], has_probabilities=True)
 
 
 def _left_to_choose(
@@ -445,6 +233,11 @@ class DesignAnswer(Answer):
         return "interrupted" if tuning is not None and tuning.interrupted else self.linear.status
 
     @property
+    def outcomes(self) -> Mapping[str, Outcome]:
+        """Verdicts over distributions by requirement; empty if none has a probability."""
+        return {}
+
+    @property
     def notes(self) -> list[str]:
         """Notes on the side of a kink that the linear models use."""
         loop, par = self.case.loop, self.case.par.replace(self.gains)
@@ -462,11 +255,9 @@ class DesignAnswer(Answer):
 
     def document(self) -> Document:
         """Return the result, the figures, and the gains as a bench file."""
-        loop, status, tried = self.case.loop, self.linear.status, self.tried
+        loop = self.case.loop
         parts = [*self.parts(), *design_parts.limit_lines(self.case, self.limits)]
-        verdict = f"requirements {status} on the linear model"
-        if tried is not None:
-            verdict = verdict_text((*self.requirements, *self._missed_floors(tried)), tried)
+        verdict = self._verdict()
         required = Listing([str(requirement) for requirement in self.requirements])
         return Document(
             f"Design of loop {loop.name}",
@@ -485,9 +276,16 @@ class DesignAnswer(Answer):
             changes=self.case.subject.changes,
         )
 
+    def _verdict(self) -> str:
+        if self.tried is None:
+            return f"requirements {self.linear.status} on the linear model"
+        return verdict_text((*self.requirements, *self._missed_floors(self.tried)), self.tried)
+
     def _brief(self, parts: Sequence[Part], verdict: str) -> list[str | Block]:
         """Return verdict, requirements and gains. The rest needs ``--verbose``."""
-        table = design_parts.requirement_table(self.requirements, self.worst, self.tried)
+        table = design_parts.requirement_table(
+            self.requirements, self.worst, self.tried, self.outcomes
+        )
         first = self.first_parts(parts)
         rest = [part for part in parts if not any(part is each for each in first)]
         point = f"loop {self.case.loop.name} of {self.case.name} at {self.points}: {verdict}"
@@ -590,21 +388,46 @@ class LoopDesign(DesignAnswer):
         The linear design.
     probability
         Probability of meeting the requirements over drawn models, or None without them.
+    on_bench
+        Requirements over the same distributions on the nonlinear bench, or None without this test.
     """
 
     designed: Design
     probability: Probability | None = None
+    on_bench: BenchProbability | None = None
+
+    @property
+    def outcomes(self) -> Mapping[str, Outcome]:
+        """Verdicts over distributions by requirement; the bench decides if it has the figure."""
+        linear = {} if self.probability is None else self.probability.outcomes
+        return {**linear, **({} if self.on_bench is None else self.on_bench.outcomes)}
 
     @property
     def holds(self) -> bool:
-        """Whether requirements are met, also on the bench and with the required probability."""
-        is_probable = self.probability is None or self.probability.outcome in (None, "met")
-        return super().holds and is_probable
+        """Whether requirements are met, also on the bench and with the required probabilities."""
+        joint = None if self.probability is None else self.probability.outcome
+        return super().holds and joint in (None, "met") and set(self.outcomes.values()) <= {"met"}
+
+    def _verdict(self) -> str:
+        missed = [each for each in self.outcomes.values() if each != "met"]
+        if not super().holds or not missed:
+            return super()._verdict()
+        return f"requirements: {len(missed)} of {len(self.outcomes)} not met over the distributions"
 
     def _remarks(self) -> list[str]:
         if self.holds or not super().holds or self.probability is None:
             return super()._remarks()
-        return [self.probability.verdict]
+        joint = self.probability.outcome in (None, "met")
+        remarks = [] if joint else [self.probability.verdict]
+        missed = [text for text, outcome in self.outcomes.items() if outcome != "met"]
+        measured = {} if self.on_bench is None else self.on_bench.outcomes
+        remarks += [
+            self.on_bench.remark(text, self.probability)
+            if self.on_bench is not None and text in measured
+            else self.probability.remark(text)
+            for text in missed
+        ]
+        return remarks
 
     @property
     def linear(self) -> Design:
@@ -619,7 +442,12 @@ class LoopDesign(DesignAnswer):
     def parts(self) -> Sequence[Part]:
         """Return the result's tables and text lines."""
         parts = design_parts.as_parts(self.case, self.requirements, self.designed, self.tried)
-        return parts if self.probability is None else [*parts, *self.probability.parts()]
+        return [*parts, *self._over_distributions]
+
+    @cached_property
+    def _over_distributions(self) -> Sequence[Part]:
+        both = (self.probability, self.on_bench)
+        return [part for each in both if each is not None for part in each.parts()]
 
     def worst(self, figure: str) -> float:
         """Return the worst value of a figure on the linear model."""
@@ -628,14 +456,18 @@ class LoopDesign(DesignAnswer):
     def first_parts(self, parts: Sequence[Part]) -> list[Part]:
         """Also return the probabilities over drawn models."""
         first = super().first_parts(parts)
-        count = 0 if self.probability is None else len(self.probability.parts())
+        count = len(self._over_distributions)
         end = len(parts) - len(design_parts.limit_lines(self.case, self.limits))
         return [*first, *parts[end - count : end]]
 
     def data(self) -> dict[str, Any]:
         """Return all results as plain data."""
         data = design_parts.as_object(self.case, self.requirements, self.designed, self.tried)
-        return data | ({} if self.probability is None else {"drawn": self.probability.data()})
+        if self.probability is not None:
+            data["drawn"] = self.probability.data()
+        if self.on_bench is not None:
+            data["drawn"]["bench"] = self.on_bench.data()
+        return data
 
 
 @dataclass(frozen=True)
@@ -706,19 +538,12 @@ def designed_at_point(
     ``wanted`` are the requirements. ``amplitudes`` is None without the nonlinear bench. For others,
     see `bywire.design`.
     """
-    least = _probability(probability)
-    if least is not None and not vary:
-        raise ParameterError(
-            f"{option('probability')} needs drawn models. Add {option('vary')} FILE with a study "
-            "file",
-            name="probability",
-            value=probability,
-            valid=option("vary"),
-        )
+    least = read_probability(probability)
+    require_drawn(wanted, probability, vary)
     case, overrides, limits = _for_ecu(case, overrides, free_derivative)
     tunables = _left_to_choose(case.loop.name, _narrowed(_tunables_of(case), limits), overrides)
     ranges = dict(over_range(text, case)[::2] for text in over)
-    models = _drawn_models(case, vary, drawn) if vary else None
+    models = drawn_models(case, vary, drawn, wanted, least) if vary else None
     cases = cases_of(case.loop, case.par, case.value, ranges)
     cases += () if models is None else models.cases
     trial = None if amplitudes is None else _trial_of(case, overrides, amplitudes)
@@ -727,12 +552,14 @@ def designed_at_point(
     designed = designer.design(tunables, wanted, cases, start, seed=seed, progress=progress)
     if trial is not None and designed.status == "met":
         tried = verify(designed.gains, wanted, tunables, cases, trial, seed=seed, progress=progress)
-    judged = None
+    judged = on_bench = None
     if models is not None:
         gains = designed.gains if tried is None else tried.final.gains
         met = judged_over(models.judges, wanted, gains, progress or silent)
         judged = Probability(models, wanted, met, least)
-    return LoopDesign(case, overrides, wanted, limits, tried, designed, judged)
+    if models is not None and trial is not None and tried is not None:
+        on_bench = bench_probability(models, wanted, trial.bench, tried.final.gains, progress)
+    return LoopDesign(case, overrides, wanted, limits, tried, designed, judged, on_bench)
 
 
 def designed_by_region(
@@ -753,6 +580,7 @@ def designed_by_region(
     ``wanted`` are the requirements. ``amplitudes`` is None without the nonlinear bench. For others,
     see `bywire.design`.
     """
+    require_no_probability(wanted)
     schedule = scheduled(LOOPS.find(name))
     overrides = {**overrides, **schedule.changes}
     case = loop_case(name, parameters, "", overrides, side)

@@ -16,6 +16,7 @@ from bywire.core.units import shown
 from bywire.report.document import Block, Flat, Listing, TableBlock
 from bywire.report.tables import OUTCOMES, Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
+from bywire.studies.statistics import Outcome
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
 from bywire.synthesis.schedules import scheduled
@@ -259,6 +260,7 @@ def as_object(
                 for binding in design.binding
             ],
             "unsound": dict(design.unsound),
+            **({"missed_by_models": dict(design.missed)} if design.missed else {}),
             "conflicts": [
                 {
                     "requirement": str(conflict.wanted),
@@ -304,7 +306,7 @@ def as_parts(
         for name in sorted(LOOP_FIGURES, key=lambda name: name not in wanted)
     ]
     parts.append(text_table(["linear model", "nominal", "worst", "at", "limit"], figures))
-    parts += _kept_lines(design) + _unsound_lines(design)
+    parts += _kept_lines(design) + _unsound_lines(design) + _missed_lines(design)
     parts += [
         f"{'binds' if design.binds else 'tightest'}: {binding.requirement}, "
         f"{_figure_text(binding.requirement.figure, binding.value)} at {binding.case}"
@@ -326,6 +328,16 @@ def _kept_lines(design: Design) -> list[str]:
         return []
     texts = ", ".join(str(requirement) for requirement in design.kept)
     return [f"also enforced: {texts} (to change a limit, add a requirement)"]
+
+
+def _missed_lines(design: Design) -> list[str]:
+    """Return a line for each requirement with a probability that some models miss."""
+    return [
+        f"{text}: {count} of the models for choosing the gains miss this limit, as its probability "
+        "permits. The worst value above does not include them"
+        for text, count in design.missed.items()
+        if count and design.status == "met"
+    ]
 
 
 def _unsound_lines(design: Design) -> list[str]:
@@ -361,11 +373,15 @@ def _gain_text(case: LoopCase, name: str, value: float) -> str:
 
 
 def requirement_table(
-    requirements: Sequence[Limit], worst: Callable[[str], float], tried: Verification | None
+    requirements: Sequence[Limit],
+    worst: Callable[[str], float],
+    tried: Verification | None,
+    outcomes: Mapping[str, Outcome],
 ) -> Table:
     """Return a row for each requirement and each figure also enforced, with the verdict first.
 
-    ``worst(figure)``: worst value on the linear model, which decides if the bench was skipped.
+    ``worst(figure)``: worst value on the linear model, which decides if the bench was skipped;
+    ``outcomes``: verdicts over distributions by requirement, which only limit a met requirement.
     """
     every = [*requirements, *(() if tried is None else tried.kept)]
     rows = []
@@ -379,6 +395,8 @@ def requirement_table(
             room = f"{100.0 * tried.final.room(text):+.1f} %"
             where = judged_on(tried.final, text)
         verdict = OUTCOMES["met" if is_met else "missed"]
+        if is_met and outcomes.get(text, "met") != "met":
+            verdict, where = OUTCOMES[outcomes[text]], "over the distributions"
         rows.append([verdict, text, linear, room, where])
     heading = ["verdict", "requirement", "linear model, worst", "margin to the limit", "judged"]
     return text_table(heading, rows)

@@ -210,16 +210,10 @@ def read_limit(
     """
     subject = f"{what} {figure}"
     probability = None
-    if isinstance(text, str) and (split := _WITH.fullmatch(text)):
-        if not has_probability:
-            raise ParameterError(
-                f"{subject} = {quoted(text)}: only requirements on the cases of a study have a "
-                f"probability. Write {quoted(split[1])}",
-                name=figure,
-                value=quoted(text),
-                valid=quoted(split[1]),
-            )
-        probability, text = _probability(figure, text, split[2]), split[1]
+    if isinstance(text, str):
+        text, probability = split_probability(
+            figure, text, subject, has_probability=has_probability
+        )
     example = limit_like(unit)
     before, compare, bound = parted(text) if isinstance(text, str) else ("", None, "")
     if compare is None or before:
@@ -230,6 +224,44 @@ def read_limit(
         limit = f"a limit in percent such as {example!r}"
         raise not_valid(subject, quoted(text), limit, kind=UnitError)
     return Limit(figure, compare, 100.0 * units.parse(bound, "1", subject), unit, text, probability)
+
+
+def split_probability(
+    figure: str, text: str, subject: str, *, has_probability: bool
+) -> tuple[str, float | None]:
+    """Split a limit such as ``"<= 15 % with 99 %"`` into the limit and its probability.
+
+    Parameters
+    ----------
+    figure, subject
+        Name of the figure, and noun for errors.
+    text
+        The limit, possibly without a probability.
+    has_probability
+        See `read_limit`.
+
+    Raises
+    ------
+    ParameterError
+        If a probability is not allowed, or not valid.
+
+    Examples
+    --------
+    >>> split_probability("overshoot", "<= 15 % with 99 %", "requirement", has_probability=True)
+    ('<= 15 %', 0.99)
+    """
+    split = _WITH.fullmatch(text)
+    if split is None:
+        return text, None
+    if not has_probability:
+        raise ParameterError(
+            f"{subject} = {quoted(text)}: only requirements on the cases of a study have a "
+            f"probability. Write {quoted(split[1])}",
+            name=figure,
+            value=quoted(text),
+            valid=quoted(split[1]),
+        )
+    return split[1], _probability(figure, text, split[2])
 
 
 _WITH = re.compile(r"(.*?)\s+with\b\s*(.*?)\s*", re.DOTALL)

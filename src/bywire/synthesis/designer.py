@@ -3,8 +3,10 @@ r"""Gains of a loop from requirements, for a set of models, with the largest wor
 .. math:: \max_{x, t} t \quad \text{with} \quad s_{jk}(x) \ge t
 
 for every requirement j and model k: the maximum of the minimum slack, without the kinks of a plain
-minimum. The optimizer uses sequential quadratic programming from several starts, then a simplex
-search if it stopped at a kink of a figure.
+minimum. Of n drawn models, the worst floor((1 - P) n) do not count for a requirement with a
+probability P, so that its slack over these models is a quantile. The optimizer uses sequential
+quadratic programming from several starts, then a simplex search if it stopped at a kink of a
+figure.
 """
 
 from __future__ import annotations
@@ -12,10 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import permutations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
@@ -74,7 +78,8 @@ class Problem:
         Dotted name -> minimum and maximum value [SI]; the search uses a logarithmic scale if the
         minimum is above zero.
     requirements
-        Constraints for every case.
+        Constraints for every case. A requirement with a probability may be missed by some of the
+        drawn models (see `spared`).
     cases
         The models, the nominal one first.
     """
@@ -105,6 +110,46 @@ class Problem:
             share = math.log(value / low, high / low) if low > 0 else (value - low) / (high - low)
             shares.append(share)
         return np.array(shares)
+
+    @cached_property
+    def spared(self) -> Mapping[int, int]:
+        """Number of drawn models that may miss a requirement, by its index, if it is above zero.
+
+        Of n draws, this is floor((1 - P) n). A draw without a model misses every requirement.
+        """
+        draws = max((case.draws for case in self.cases), default=0)
+        lacking = draws - sum(case.draws > 0 for case in self.cases)
+        counts = {
+            j: math.floor((1.0 - wanted.probability) * draws + 1e-9) - lacking
+            for j, wanted in enumerate(self.requirements)
+            if wanted.probability is not None
+        }
+        return {j: count for j, count in counts.items() if count > 0}
+
+    def counted(
+        self, slacks: ArrayLike, cases: Sequence[int], stable: Sequence[bool] | None = None
+    ) -> Array:
+        """Return slacks in which infinity replaces those that do not count.
+
+        For each requirement, the worst drawn models do not count, up to the permitted number. An
+        unstable model always counts.
+
+        Parameters
+        ----------
+        slacks
+            Shape (cases, requirements).
+        cases
+            Indices of the cases.
+        stable
+            Whether each case is stable. By default, this follows from slacks of `slacks`.
+        """
+        counted = np.array(slacks, dtype=float)
+        drawn = np.array([k for k, case in enumerate(cases) if self.cases[case].draws], dtype=int)
+        is_stable = counted.min(axis=1) >= _LEAST if stable is None else np.array(stable)
+        for j, count in self.spared.items():
+            worst = drawn[np.argsort(counted[drawn, j], kind="stable")[:count]]
+            counted[worst[is_stable[worst]], j] = np.inf
+        return counted
 
     def slacks(self, z: Array, cases: Sequence[int], *, plain: bool = False) -> Array:
         """Return the slack of every requirement for some cases, shape (cases, requirements).
@@ -213,7 +258,17 @@ class Search:
         return list(range(count)) if self.wanted is None else list(self.wanted)
 
     def _slacks(self, z: Array) -> Array:
-        return self.problem.slacks(np.clip(z, 0.0, 1.0), self.cases, plain=self.plain)
+        """Return the slacks that count, shape (cases, requirements).
+
+        Slacks of a requirement that some models may miss are in descending order: which models
+        these are may change between points, but each order statistic is continuous.
+        """
+        slacks = self.problem.slacks(np.clip(z, 0.0, 1.0), self.cases, plain=self.plain)
+        if self.problem.spared:
+            counted = self.problem.counted(slacks, self.cases)
+            for j in self.problem.spared:
+                slacks[:, j] = np.minimum(np.sort(counted[:, j])[::-1], _LARGEST)
+        return slacks
 
     def _judged(self, z: Array) -> float:
         """Return the worst slack of the objectives, or the violation of a constraint."""
@@ -477,12 +532,17 @@ def _over_all(
         search.run(begin, stage(progress, f"linear design{models}"))
         if search.best is None:
             return
-        slacks = problem.slacks(search.best, everything).min(axis=1)
+        every = problem.slacks(search.best, everything)
+        counted = problem.counted(every, everything)
+        slacks = counted.min(axis=1)
         worst = int(np.argmin(slacks))
-        if slacks[worst] >= search.slack - 1e-4 or worst in search.cases:
+        # Models that do not count are needed too: the search spares as many of its own models.
+        missing = np.flatnonzero(np.isinf(counted[:, int(np.argmin(counted[worst]))])).tolist()
+        added = [k for k in (*missing, worst) if k not in search.cases]
+        if slacks[worst] >= search.slack - 1e-4 or not added:
             return
         begin = [search.best]
-        search.cases, search.slack, search.seen = [*search.cases, worst], -np.inf, []
+        search.cases, search.slack, search.seen = [*search.cases, *added], -np.inf, []
 
 
 def _by_figures(search: Search, progress: Progress | None) -> Search:
@@ -504,12 +564,14 @@ def _confirmed(search: Search) -> Array:
 
     def fine_slack(z: Array) -> float:
         every = [case.figures(problem.gains(z), _FINE) for case in problem.cases]
-        return min(
-            min(slack(figures, wanted) for wanted in problem.requirements)
+        slacks = [
+            [slack(figures, wanted) for wanted in problem.requirements]
             if figures.is_stable
-            else UNSTABLE
+            else [UNSTABLE] * len(problem.requirements)
             for figures in every
-        )
+        ]
+        stable = [figures.is_stable for figures in every]
+        return float(problem.counted(slacks, range(len(every)), stable).min())
 
     best = _looked_anew(search, fine_slack, -np.inf, 1e-4, (_CONFIRMED, _ALIKE))
     return np.asarray(search.best if best is None else best)
@@ -526,9 +588,11 @@ def _confirmed_by_figures(search: Search, wanted: Limit, kept: Limit) -> Array |
         every = [problem.cases[k].figures(problem.gains(z), _FINE) for k in search.cases]
         if not all(figures.is_stable for figures in every):
             return -np.inf
-        if min(room(figures, kept) for figures in every) < _HELD:
+        rooms = [[room(figures, each) for each in problem.requirements] for figures in every]
+        least = problem.counted(rooms, search.cases, [True] * len(every)).min(axis=0)
+        if least[problem.requirements.index(kept)] < _HELD:
             return -np.inf
-        return min(room(figures, wanted) for figures in every)
+        return float(least[problem.requirements.index(wanted)])
 
     return _looked_anew(search, fine_room, KEPT_MISSED, 1e-3, (_CONFIRMED_FIGURES, _APART))
 
@@ -565,7 +629,8 @@ def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...
     problem = search.problem
     if search.best is None:
         return ()
-    slacks = problem.slacks(search.best, search.cases, plain=True).min(axis=0)
+    slacks = problem.slacks(search.best, search.cases, plain=True)
+    slacks = problem.counted(slacks, search.cases).min(axis=0)
     bound = [int(k) for k in np.argsort(slacks) if slacks[k] <= slacks.min() + 5 * _BINDS]
     conflicts = []
     report = stage(progress, "conflicting requirements")
@@ -587,7 +652,14 @@ def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...
 def _extreme(
     problem: Problem, gains: Mapping[str, float], wanted: Limit, cases: Sequence[int]
 ) -> float:
-    values = [getattr(problem.cases[k].figures(gains, _FINE), wanted.figure) for k in cases]
+    every = [problem.cases[k].figures(gains, _FINE) for k in cases]
+    rooms = [[room(figures, each) for each in problem.requirements] for figures in every]
+    counted = problem.counted(rooms, cases, [True] * len(every)) == np.array(rooms)
+    values = [
+        getattr(figures, wanted.figure)
+        for figures, counts in zip(every, counted, strict=True)
+        if counts[problem.requirements.index(wanted)]
+    ]
     return float(min(values) if not wanted.is_upper else max(values))
 
 
@@ -599,10 +671,14 @@ def _judged(
     every = {case.label: case.figures(gains, _FINE) for case in problem.cases}
     rows = {label: values_of(figures) for label, figures in every.items()}
     states = {label: state_of(figures) for label, figures in every.items()}
+    rooms = np.array([[room(f, wanted) for wanted in problem.requirements] for f in every.values()])
+    stable = [figures.is_stable for figures in every.values()]
+    counts = problem.counted(rooms, range(len(rooms)), stable) == rooms
     bindings = [
-        Binding(wanted, label, rows[label][wanted.figure], room(every[label], wanted))
-        for label in rows
-        for wanted in problem.requirements
+        Binding(wanted, label, rows[label][wanted.figure], float(rooms[k, j]))
+        for k, label in enumerate(rows)
+        for j, wanted in enumerate(problem.requirements)
+        if counts[k, j]
     ]
     bindings.sort(key=lambda binding: binding.slack)
     is_sound = set(states.values()) == {""}
@@ -610,8 +686,14 @@ def _judged(
     worst = {}
     for name, figure in LOOP_FIGURES.items():
         sign = -1.0 if figure.is_less_better else 1.0
-        label = min(rows, key=lambda case: _size(sign * rows[case][name]))
+        counted = [label for k, label in enumerate(rows) if counts[k, _limits(problem, name)].all()]
+        label = min(counted, key=lambda case: _size(sign * rows[case][name]))
         worst[name] = (rows[label][name], label)
+    missed = {
+        str(wanted): int((rooms[:, j] < MISSED).sum())
+        for j, wanted in enumerate(problem.requirements)
+        if wanted.probability is not None
+    }
     return Design(
         gains=gains,
         status=status or ("met" if slack >= MISSED else "infeasible"),
@@ -622,7 +704,18 @@ def _judged(
         slack=float(slack),
         evaluations=problem.evaluations,
         unsound={label: state for label, state in states.items() if state},
+        missed=missed,
     )
+
+
+def _limits(problem: Problem, figure: str) -> list[int]:
+    """Return the indices of requirements that limit a figure on its worse side."""
+    is_upper = LOOP_FIGURES[figure].is_less_better
+    return [
+        j
+        for j, each in enumerate(problem.requirements)
+        if each.figure == figure and each.is_upper == is_upper
+    ]
 
 
 def _size(value: float) -> float:

@@ -17,7 +17,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
 from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigure, LoopFigures
 from bywire.analysis.margins import NO_LOOP
-from bywire.bench.requirements import Limit, parted
+from bywire.bench.requirements import Limit, parted, split_probability
 from bywire.core import units
 from bywire.core.errors import (
     InputError,
@@ -51,7 +51,7 @@ def share_left(limit: Limit, value: float) -> float:
     return -math.inf if math.isnan(share) else share
 
 
-def read(texts: Sequence[str]) -> tuple[Limit, ...]:
+def read(texts: Sequence[str], *, has_probabilities: bool = False) -> tuple[Limit, ...]:
     """Return requirements written as text.
 
     Parameters
@@ -59,6 +59,8 @@ def read(texts: Sequence[str]) -> tuple[Limit, ...]:
     texts
         Texts such as ``"bandwidth >= 10 Hz"``; the name of a figure may contain blanks and hyphens,
         or be a name from `bywire.margins`, such as ``phase``.
+    has_probabilities
+        Whether a requirement may end with a probability, such as ``with 99 %``.
 
     Raises
     ------
@@ -76,13 +78,13 @@ def read(texts: Sequence[str]) -> tuple[Limit, ...]:
             name="requirement",
             valid="'bandwidth >= 10 Hz'",
         )
-    requirements = tuple(_read(text) for text in texts)
+    requirements = tuple(_read(text, has_probabilities) for text in texts)
     for first, second in combinations(requirements, 2):
         _require_compatible(first, second)
     return requirements
 
 
-def _read(text: str) -> Limit:
+def _read(text: str, has_probability: bool) -> Limit:
     word, compare, written = parted(text) if isinstance(text, str) else ("", None, "")
     if not word or compare is None or not written:
         raise ParameterError(
@@ -95,6 +97,12 @@ def _read(text: str) -> Limit:
     if word not in _BY_WORD:
         raise unknown_name("figure of a loop", word, LOOP_FIGURES)
     figure, is_least = _BY_WORD[word], compare in (">=", ">")
+    written, probability = split_probability(
+        figure.name,
+        written,
+        f"requirement {figure.name}",
+        has_probability=has_probability,
+    )
     bound = _bound(written, figure)
     # Every loop, or no loop, meets a limit at the end of the possible range.
     possible = figure.low <= bound <= figure.high and not (is_least and bound >= figure.high)
@@ -108,7 +116,7 @@ def _read(text: str) -> Limit:
             value=text,
             valid=f"{reach} {figure.unit}",
         )
-    return Limit(figure.name, compare, bound, figure.unit, f"{compare} {written}")
+    return Limit(figure.name, compare, bound, figure.unit, f"{compare} {written}", probability)
 
 
 def _bound(text: str, figure: LoopFigure) -> float:
@@ -171,12 +179,16 @@ class LinearCase:
     changes, at
         Differences of its parameters from the nominal model, and its operating point [SI]; None for
         a model that is not a loop of the bench, for example an identified one.
+    draws
+        For a randomly drawn model, the number of draws to which it belongs, including those for
+        which no model exists; 0 for the nominal model and those of ranges.
     """
 
     label: str
     build: Callable[[Mapping[str, float]], tuple[LinearModel, LinearModel]]
     changes: Mapping[str, float] = field(default_factory=dict)
     at: float | None = None
+    draws: int = 0
 
     def figures(self, gains: Mapping[str, float], points: int = 400) -> LoopFigures:
         """Return the figures of the loop with given gains; see `LoopFigures`."""

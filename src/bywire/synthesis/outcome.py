@@ -76,7 +76,8 @@ class Design:
     nominal
         All figures of the nominal model.
     worst
-        Figure -> worst value over all models, and the model's label.
+        Figure -> worst value over all models, and the model's label. The drawn models that may miss
+        a requirement with a probability do not count for its figure.
     binding
         Binding requirements, the worst first.
     conflicts
@@ -90,6 +91,8 @@ class Design:
         Constraints that were also enforced; see `designer.linear_floors`.
     unsound
         Models without figures, by label: unstable, or without a loop.
+    missed
+        Number of models that miss each requirement with a probability, by its text.
     """
 
     gains: Mapping[str, float]
@@ -102,6 +105,7 @@ class Design:
     evaluations: int
     kept: tuple[Limit, ...] = ()
     unsound: Mapping[str, str] = field(default_factory=dict)
+    missed: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def binds(self) -> bool:

@@ -14,7 +14,11 @@ if TYPE_CHECKING:
 
 Required = Annotated[
     Sequence[str],
-    Ask("Requirement, e.g. 'bandwidth >= 10 Hz'. Repeatable.", "Requirements"),
+    Ask(
+        "Requirement, e.g. 'bandwidth >= 10 Hz', or with --vary 'overshoot <= 15 % with 99 %'. "
+        "Repeatable.",
+        "Requirements",
+    ),
 ]
 RequirementsFile = Annotated[str | Path | None, Ask("TOML file with a [requirements] section.")]
 Ranges = Annotated[
@@ -106,7 +110,8 @@ def design(
         See `bywire.margins`. The design does not change a parameter that you set. With
         ``schedule``, ``at`` lists one point for each region.
     require
-        Requirements, for example ``"bandwidth >= 10 Hz"``.
+        Requirements, for example ``"bandwidth >= 10 Hz"``. With ``vary``, a requirement may end
+        with its probability, for example ``"overshoot <= 15 % with 99 %"``.
     requirements
         TOML file with a ``[requirements]`` section.
     over
@@ -117,13 +122,14 @@ def design(
     schedule
         Whether to schedule the gains by region.
     linear_only
-        Whether to skip the test on the nonlinear bench.
+        Whether to skip the test on the nonlinear bench, also over the distributions of ``vary``.
     free_derivative
         Whether the derivative filter may be faster than the sampling, and the derivative may act on
         the set point. This improves the figures, but such gains are rarely suitable for an ECU.
     vary
         Study file. bywire draws models from its distributions, chooses the gains for these models,
-        and tests the gains on additional models.
+        and tests the gains on additional models. If requirements have probabilities, it also tests
+        the gains on the nonlinear bench with these distributions.
     drawn
         Number of models that bywire draws to choose the gains.
     probability
