@@ -82,7 +82,7 @@ def failing(status: Status) -> Callable[..., Any]:
         (
             "cuInit",
             Status.CUDA_ERROR_SYSTEM_DRIVER_MISMATCH,
-            "does not fit the driver.*Restart the machine",
+            "does not match the driver.*Restart the machine",
         ),
     ],
 )

@@ -128,13 +128,14 @@ class Probability:
     def remark(self, text: str) -> str:
         """Return a sentence on a requirement that is not met over the test models."""
         told = self.share_of(text)
-        count = f"{told.count} of {told.cases} test models meet it"
+        count = f"{told.count} of {told.cases} test models meet the requirement"
         if self._limit(text).probability is None:
             advice = "Add a probability, as in 'with 99 %', or"
         elif self.outcomes[text] == "undecided":
-            advice = "This is too close to the required probability to decide. For more distance,"
+            advice = "This is too close to the required probability for a decision. For a larger"
+            advice += " margin,"
         else:
-            advice = "For gains that meet it more often,"
+            advice = "For gains that meet the requirement more often,"
         more = f"choose gains for more models ({option('drawn')} {4 * self.drawn.count})"
         if 4 * self.drawn.count > _MOST:
             more = "use a wider limit"
@@ -291,7 +292,7 @@ def _judge_count(requirements: Sequence[Limit], wanted: float | None, confidence
 
 
 def _deciding(wanted: float, missing: int, confidence: float) -> int:
-    """Return the smallest number of models of which some may miss a limit that is surely met."""
+    """Return the minimum number of models with which a limit is met even if some miss it."""
 
     def is_decided(count: int) -> bool:
         return share(count - missing, count, confidence).low >= wanted
@@ -329,7 +330,7 @@ def require_no_probability(requirements: Sequence[Limit]) -> None:
 
 
 def require_drawn(requirements: Sequence[Limit], probability: str, vary: str | Path) -> None:
-    """Reject probabilities without a study file, whose distributions they need.
+    """Reject probabilities without a study file, because they need its distributions.
 
     Raises
     ------
@@ -377,8 +378,8 @@ def read_probability(text: str) -> float | None:
 def _require_fitting(case: LoopCase, plan: StudyPlan, file: str | Path) -> None:
     if type(plan.bench.par) is not type(case.par):
         raise ParameterError(
-            f"{file}: its bench runs {plan.bench.system}, but loop {case.loop.name!r} belongs to "
-            f"{case.loop.assembly}. Choose a study of {case.loop.assembly}",
+            f"{file}: the study's bench runs {plan.bench.system}, but loop {case.loop.name!r} "
+            f"belongs to {case.loop.assembly}. Choose a study of {case.loop.assembly}",
             name=str(file),
             value=plan.bench.system,
             valid=case.loop.assembly,
@@ -387,7 +388,7 @@ def _require_fitting(case: LoopCase, plan: StudyPlan, file: str | Path) -> None:
         if name.startswith(OPTION):
             raise ParameterError(
                 f"{file}: {name} is an option of the experiment, but the loop has no such option. "
-                "Remove it",
+                f"Remove {name}",
                 name=name,
             )
         require_given(case.loop, name)
@@ -431,8 +432,8 @@ class BenchProbability:
         ]
         if findings.failed:
             lines.append(
-                f"{findings.failed} of these cases have no result, and meet no requirement: "
-                f"{findings.reasons[0].text}"
+                f"{findings.failed} of these cases have no result, and do not meet any "
+                f"requirement: {findings.reasons[0].text}"
             )
         return lines
 
@@ -545,7 +546,7 @@ def bench_probability(
     gains
         By dotted name [SI].
     progress
-        Called with a label and the finished share.
+        Called with a label and the completed fraction, 0 to 1.
 
     Returns
     -------

@@ -65,7 +65,7 @@ class ProcedureResult(Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether every limit is met; a limit without a verdict is not."""
+        """Whether every limit is met. A limit without a verdict is not met."""
         return self.status == "passed"
 
     @property
@@ -90,7 +90,7 @@ class ProcedureResult(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the runs, each once, with the number of stops."""
+        """Warnings of the runs, each once, with the name of the stop."""
         counts = Counter(
             f"{stop.plan.name}: {text}" for stop in self.stops for text in stop.warnings
         )
@@ -104,7 +104,7 @@ class ProcedureResult(Answer):
         subject = Subject.of_bench(plan.bench, plan.name, summary)
         stops, limits = TableBlock(self._stops()), TableBlock(self._limits())
         warned = [Listing([f"Warning: {text}." for text in self.warnings])] if self.warnings else []
-        absent = [Listing(plan.missing, "The procedure leaves out:")] if plan.missing else []
+        absent = [Listing(plan.missing, "Not included in this file:")] if plan.missing else []
         source = [Paragraph(f"Source: {plan.source}.")] if plan.source else []
         figures: list[Block] = []
         if any(self._groups()):
@@ -151,7 +151,7 @@ class ProcedureResult(Answer):
     def _remarks(self) -> list[str]:
         return [
             f"limit not met: {each.kpi} of {stop.plan.name} {_numbered(stop)} is "
-            f"{amount(each.value, each.unit)}, limit {each.limit}"
+            f"{amount(each.value, each.unit)}, and the limit is {each.limit}"
             for stop in self.stops
             for each in stop.verdicts
             if each.outcome == "missed"
@@ -207,7 +207,7 @@ class ProcedureResult(Answer):
         )
 
     def _groups(self) -> list[list[Stop]]:
-        """Return groups of stops that warm up each other's brakes."""
+        """Return groups of stops in which each stop begins with the heat of the previous one."""
         groups: list[list[Stop]] = []
         for stop in self.stops:
             discs = [name for name in stop.course if name.startswith("T_disc")]
@@ -282,12 +282,13 @@ class ProcedureResult(Answer):
 
 
 _HEAT_CAPTION = (
-    "Disc temperatures. Solid lines are stops, and dotted lines are the intervals between them. "
-    "Each panel shows stops that heat each other's brakes."
+    "Disc temperatures. Solid lines show the stops, and dotted lines show the intervals between "
+    "them. Each panel shows a series of stops in which each stop begins with the heat of the "
+    "previous one."
 )
 _LIMIT_CAPTION = (
-    "Used part of each limit: the value over an upper limit, or a lower limit over the value. Bars "
-    "beyond the dotted line miss their limit."
+    "Utilization of each limit: the ratio of the value to an upper limit, or of a lower limit to "
+    "the value. Bars that extend past the dotted line miss their limit."
 )
 
 
@@ -313,7 +314,7 @@ def _conditions(stop: Stop) -> str:
     if plan.T_brake is not None and (stop.first == 1 or plan.interval is None):
         texts.insert(0, f"discs at {amount(plan.T_brake, 'K')}")
     elif plan.interval is not None and stop.begin > 0.0:
-        texts.insert(0, f"{amount(plan.interval, 's')} after the previous start")
+        texts.insert(0, f"{amount(plan.interval, 's')} after the start of the previous stop")
     if plan.deceleration is not None:
         texts.append(f"adjusted to {amount(plan.deceleration, 'm/s**2')}")
     return ", ".join(texts)
@@ -327,7 +328,7 @@ def _kpi_cell(stop: Stop, name: str) -> Cell:
 
 
 def _used_part(verdict: Verdict) -> float:
-    """Return the value over an upper limit, or a lower limit over the value."""
+    """Return the ratio of the value to an upper limit, or of a lower limit to the value."""
     share = verdict.value / verdict.required.bound
     return share if verdict.required.is_upper else 1.0 / share
 

@@ -48,7 +48,7 @@ _SHORT = 60  # characters of a requirement in a terminal
 
 @dataclass(frozen=True)
 class ManualEntry(Answer):
-    """Statement of a person, with the file that documents it.
+    """Statement by a person, with the file that documents it.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class Verdict:
     shown
         Its evidence.
     reasons
-        Reasons for a verdict that is not ``met``.
+        Reasons for a verdict other than ``met``.
     """
 
     statement: Statement
@@ -211,7 +211,7 @@ class SignOff(Answer):
     def _decide(
         self, each: Statement, every: Mapping[str, Statement], found: dict[str, Verdict]
     ) -> Verdict:
-        """Return the verdict on a statement; plans have no circles of assumptions."""
+        """Return the verdict on a statement. Plans do not contain circular assumptions."""
         if each.id in found:
             return found[each.id]
         shown = tuple(one for one in self._shown if each.id in one.evidence.shows)
@@ -249,7 +249,7 @@ class SignOff(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the evidence, and evidence that shows nothing."""
+        """Warnings from the evidence, and evidence that does not support any requirement."""
         texts = [
             f"{one.evidence.task.title}: {text}"
             for one in self._shown
@@ -260,8 +260,8 @@ class SignOff(Answer):
 
     def _loose(self) -> list[str]:
         return [
-            f"{one.evidence.place}: the evidence {one.evidence.task.title!r} shows no requirement. "
-            "Add shows, or remove it"
+            f"{one.evidence.place}: the evidence {one.evidence.task.title!r} does not support any "
+            "requirement. Add the key shows, or remove the evidence"
             for one in self._shown
             if not one.evidence.shows
         ]
@@ -385,17 +385,17 @@ class SignOff(Answer):
                 [clean(each) for each in bare] or ["none"],
                 "Requirements and assumptions without evidence:",
             ),
-            Listing([clean(each) for each in loose] or ["none"], "Evidence without requirement:"),
+            Listing([clean(each) for each in loose] or ["none"], "Evidence without a requirement:"),
         ]
 
     def _warnings_section(self) -> list[Section]:
         texts = [clean(text) for text in self.warnings]
-        return [Section("Warnings of the evidence", [Listing(texts)])] if texts else []
+        return [Section("Warnings from the evidence", [Listing(texts)])] if texts else []
 
     def _changes_blocks(self) -> list[Block]:
         if not self.previous:
             return [Paragraph("There is no earlier sign-off to compare with.")]
-        where = f"Since the sign-off in {clean(self.compared_with)}:"
+        where = f"Changes since the sign-off in {clean(self.compared_with)}:"
         return [Listing([clean(text) for text in self.changes] or ["none"], where)]
 
     @cached_property
@@ -533,7 +533,7 @@ def _reason(judged: Judged) -> str:
 
 
 def _value(judged: Judged) -> str:
-    """Return the value, in dB where the limit is in dB."""
+    """Return the value, in dB if the limit is in dB."""
     if not judged.unit:
         return "-"
     if _is_in_decibel(judged):
@@ -543,7 +543,7 @@ def _value(judged: Judged) -> str:
 
 
 def _beside_limit(judged: Judged) -> tuple[float | None, float, str]:
-    """Return value, error and unit: in percent where the limit is in percent."""
+    """Return the value, error and unit, in percent if the limit is in percent."""
     limit = judged.limit.partition(" with ")[0]
     return beside_limit(judged.value, judged.error, judged.unit, limit)
 
@@ -636,7 +636,7 @@ def _shown_data(one: Shown) -> dict[str, Any]:
 def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
     """Yield the changes between the JSON objects of two sign-offs.
 
-    The earlier one may come from anywhere, so that entries of another form are ignored.
+    The earlier object may come from any file, so entries of another form are ignored.
     """
     old, new = _by_id(before), _by_id(now)
     for id, each in new.items():
@@ -647,7 +647,7 @@ def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]
         if earlier.get("outcome") != each["outcome"]:
             yield f"{id} is {each['outcome']}; it was {earlier.get('outcome')}"
         if earlier.get("text") != each["text"]:
-            yield f"{id}: its text has changed"
+            yield f"{id}: the text has changed"
         digests = {one.get("title"): one.get("digest") for one in _entries(earlier, "evidence")}
         for one in each["evidence"]:
             known = digests.pop(one["title"], None)
@@ -747,8 +747,8 @@ class Affected(Answer):
         table = TableBlock(text_table(("evidence", "reason", "affects"), rows))
         ids = {id for each in affected.values() for id in each}
         text = (
-            f"{len(rows)} of {len(tasks)} results must be computed, for "
-            f"{_counted(len(ids), 'requirement')} and assumptions"
+            f"{len(rows)} of {len(tasks)} results must be computed. Affected requirements and "
+            f"assumptions: {len(ids)}"
         )
         return Document(
             f"Changes: {clean(self.plan.name)}",
@@ -771,7 +771,7 @@ class Affected(Answer):
                 ],
             },
             banner=Banner(text, "open" if rows else "good"),
-            has_files=False,  # the folder keeps the document of the sign-off
+            has_files=False,  # so that the folder keeps the document of the last sign-off
         )
 
 

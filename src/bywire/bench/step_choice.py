@@ -1,9 +1,10 @@
 """Choice of the step with which the key figures of a bench have a stated numerical error.
 
-bywire tries steps that divide all sample times, from the longest one on, and estimates the error
-with each of them as `bywire.bench.step_error` does. The error of a figure is relative to its own
-magnitude, or to the maximum of the signals from which it is computed, if that is larger. A small
-difference of large signals, such as a steady-state error, is therefore judged like the signals.
+bywire tries steps that divide all sample times, beginning with the longest one, and estimates the
+error with each of them in the same way as `bywire.bench.step_error`. The error of a figure is
+relative to its own magnitude, or to the maximum of the signals from which it is computed, if that
+is larger. A small difference between large signals, such as a steady-state error, is therefore
+judged like the signals.
 
 The choice is a function of the benches: the same bench always has the same step.
 """
@@ -60,12 +61,12 @@ def with_chosen_step(
         The bench. Its key figures with limits must meet the error, or all key figures if there are
         no limits.
     variations
-        Parameters and options [SI] of cases that must also meet it, by name. Cases that the
-        experiment rejects, or that fail with every step, do not count.
+        Parameters and options [SI] of cases that must also meet the error, by name. Cases that the
+        experiment rejects, or that fail with every step, are ignored.
     progress
-        Called with a label and the finished fraction, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
     engine
-        Engine of the runs; ``auto`` uses the bench's engine.
+        Engine of the runs. ``auto`` uses the bench's engine.
 
     Raises
     ------
@@ -114,7 +115,7 @@ def _chosen(trials: _Trials, progress: Progress | None) -> dict[str, Any]:
 
 
 def spread_over(values: Sequence[Any], most: int = 16) -> list[Any]:
-    """Return at most a number of values, evenly spread from the first one to the last one."""
+    """Return at most ``most`` values, evenly spread from the first value to the last one."""
     count = min(most, len(values))
     if not count:
         return []
@@ -188,14 +189,14 @@ def _unreached(bench: Bench, best: _Trial, finest: float) -> StepError:
         scatter = ", whose values scatter from step to step,"
         why = (
             f"{figure}{scatter if is_scattered else ''} has a numerical error of up to "
-            f"{error_text(reached)} with {shown(best.step, 's', 'us')}"
+            f"{error_text(reached)} with a step of {shown(best.step, 's', 'us')}"
         )
         if reached <= LARGEST_ERROR:
             advice.insert(0, option("overrides", {"simulation.error": error_text(reached)}))
     also = "" if bench.limits else ", or limit the key figures that matter in [requirements]"
     return StepError(
-        f"simulation.error = {stated} cannot be reached with steps from "
-        f"{shown(finest, 's', 'us')} on: {why}. Type {' or '.join(advice)}{also}",
+        f"simulation.error = {stated} cannot be reached with steps of "
+        f"{shown(finest, 's', 'us')} or longer: {why}. Type {' or '.join(advice)}{also}",
         name="simulation.error",
         value=stated,
         valid=f">= {error_text(reached)}" if reached <= LARGEST_ERROR else "",
@@ -218,7 +219,7 @@ def _rounded_up(error: float) -> float:
 
 @dataclass(frozen=True)
 class Errors:
-    """Numerical errors of the deciding key figures of some benches, as fractions.
+    """Numerical errors of the key figures that must meet the stated error, as fractions.
 
     Parameters
     ----------
@@ -353,7 +354,7 @@ def errors_of(
 class _Trial:
     """Errors with a step.
 
-    ``step``: the step [s]; ``doubt``: why the step is too long for the runs.
+    ``step``: the step [s]; ``doubt``: the reason why the step is too long for the runs.
     """
 
     step: float
@@ -377,11 +378,11 @@ class _Trials:
         return len(self.benches)
 
     def confirmed(self, step: float, stated: float) -> _Trial:
-        """Return the errors with a step, confirmed with half of it if they are as small as stated.
+        """Return the errors with a step, confirmed with half the step if they meet the stated one.
 
         A figure whose values scatter may meet the error by chance, and may appear to converge. If a
-        figure does not converge with one of both steps, its error is at least the root mean square
-        of both errors.
+        figure does not converge with one of the two steps, its error is at least the root mean
+        square of the two errors.
 
         Raises
         ------
@@ -446,7 +447,7 @@ def figures_of(benches: Sequence[Bench | None]) -> Figures:
     Raises
     ------
     RunError
-        When the first bench fails. The figures of another one that fails are not defined.
+        When the first bench fails. The figures of any other bench that fails are not defined.
     """
     first = benches[0]
     assert first is not None

@@ -1,8 +1,8 @@
 """Limits of key figures that depend on the test speed, or on an earlier stop.
 
 A limit is a constant, ``"<= 41 m"``, a formula, ``"<= (0.1*V + V^2/115) m, V in km/h"``, or a
-fraction, ``">= 60 % of cold stop"``. The formula is arithmetic on numbers and V. It is parsed to a
-syntax tree, of which only arithmetic is evaluated.
+fraction, ``">= 60 % of cold stop"``. The formula is arithmetic on numbers and V. Python parses the
+formula to a syntax tree, of which bywire evaluates only arithmetic nodes.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def compiled(formula: str, name: str) -> Callable[[float], float]:
     Raises
     ------
     ParameterError
-        When the formula contains anything but numbers, ``V``, ``+ - * / ^`` and parentheses.
+        When the formula contains anything other than numbers, ``V``, ``+ - * / ^`` and parentheses.
 
     Examples
     --------

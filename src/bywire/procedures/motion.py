@@ -1,4 +1,4 @@
-"""Motion and heat of a vehicle in the recordings of its stops, found by the parts of its model."""
+"""Motion and heat of a vehicle in recordings of its stops, from the parts of its model."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ FIGURES = Figures(
     stopping_time=("s", "Time from the demand to the first standstill."),
     mfdd=(
         "m/s**2",
-        "Mean fully developed deceleration: from 0.8 to 0.1 of the initial speed, over distance.",
+        "Mean fully developed deceleration: average over distance, from 0.8 to 0.1 of the initial "
+        "speed.",
     ),
     time_to_lift=("s", "Time from the demand until the rear wheel leaves the ground."),
     disc_before=("K", "Temperature of the hottest disc at the start of the stop."),
@@ -77,7 +78,7 @@ class Motion:
         if len(cases) != 1:
             raise ParameterError(
                 f"experiment {bench.experiment!r} makes {len(cases)} runs, but a procedure needs "
-                "an experiment that makes one stop",
+                "an experiment with a single stop",
                 name="experiment",
                 value=bench.experiment,
                 valid="an experiment with one stop",
@@ -90,8 +91,8 @@ class Motion:
                 break
         else:
             raise ParameterError(
-                f"no part of {bench.system} moves at options.{SPEED} when experiment "
-                f"{bench.experiment!r} begins. Use an experiment that stops a vehicle",
+                f"no part of {bench.system} moves at options.{SPEED} at the start of experiment "
+                f"{bench.experiment!r}. Use an experiment that stops a vehicle",
                 name="experiment",
                 value=bench.experiment,
                 valid="an experiment that stops a vehicle",

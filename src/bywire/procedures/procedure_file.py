@@ -1,7 +1,7 @@
-"""Procedure files: TOML in, a plan of stops out; nothing in them is executed.
+"""Reader of procedure files, which returns a plan of stops. It never executes any file content.
 
-A condition or limit may contain numbers by name in braces, ``"{v_test}"``. Each number has a source
-or is missing. Stops whose conditions need a missing number are not run.
+A condition or limit may contain names of numbers in braces, ``"{v_test}"``. Each number has a
+source or is missing. bywire does not run stops whose conditions need a missing number.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ class NumberSection(Section):
 
     value: _QuotedOrNone = None
     source: Annotated[str | None, Hint("write the document and the paragraph")] = None
-    missing: Annotated[str | None, Hint("write where the number stands")] = None
+    missing: Annotated[str | None, Hint("write where the source states the number")] = None
 
 
 class StopSection(Section):
-    """A section ``[[stops]]``: conditions and limits of one or several stops."""
+    """A section ``[[stops]]``: conditions and limits of one or more stops."""
 
     name: Annotated[Name, Hint("write a name that is not blank")]
     source: str = ""
@@ -71,7 +71,7 @@ class StopSection(Section):
 class ProcedureFile(Section):
     """A procedure file."""
 
-    procedure: Annotated[Name, Hint('write procedure = "...", a title')]
+    procedure: Annotated[Name, Hint('write the title: procedure = "..."')]
     source: str = ""
     experiment: Annotated[str, Hint("write experiment = \"...\" (see 'bywire list experiments')")]
     parameters: str = ""
@@ -104,12 +104,12 @@ class Number:
 
 @dataclass(frozen=True)
 class StopPlan:
-    """One or several stops under the same conditions.
+    """One or more stops under the same conditions.
 
     Parameters
     ----------
     name, source
-        Name, and paragraph of the procedure.
+        Name of the stops, and their paragraph in the source.
     bench
         The stop with cold brakes; None if a number is missing.
     motion
@@ -124,8 +124,8 @@ class StopPlan:
     cooling_speed
         Speed between the stops [m/s].
     T_brake
-        Temperature of the discs before the first stop [K], or before each stop without an interval.
-        None for the temperature that remains after the interval, or that of the air.
+        Disc temperature before the first stop [K], or before each stop without an interval. None
+        for the temperature that remains after the interval, or the air temperature.
     deceleration
         Mean fully developed deceleration to which the demand is adjusted [m/s^2]; None for the
         demand of the bench.
@@ -134,7 +134,7 @@ class StopPlan:
     limits
         Limits of key figures.
     changes
-        The user's changes for these stops.
+        The user's changes to these stops.
     lacking
         Names of the missing numbers without which the stops cannot run.
     unknown
@@ -199,7 +199,7 @@ class ProcedurePlan:
     v_max
         Maximum speed of the vehicle [m/s].
     demand
-        Options that a deceleration adjusts, and which the report lists.
+        Options that bywire scales to reach a deceleration. The report lists them.
     stops
         The stops in their order.
     numbers
@@ -239,7 +239,7 @@ class ProcedurePlan:
 
     @property
     def demand_figures(self) -> Figures:
-        """Key figures of the demand: the largest value of each of its options."""
+        """Key figures of the demand: the maximum value of each of its options."""
         leaves = leaf_fields(self.bench.definition.options)
         declared: dict[str, Any] = {
             f"demand_{name}": (leaves[name].unit.symbol, f"Demand of the stop, options.{name}.")
@@ -258,7 +258,7 @@ def read_procedure(
     source
         TOML file (see ``docs/procedures.md``).
     overrides
-        Changes to the vehicle's stops in the form of ``--set``; also ``v_max`` and
+        Changes to the vehicle's stops in the same form as ``--set``, including ``v_max`` and
         ``numbers.NAME``.
 
     Raises
@@ -266,7 +266,7 @@ def read_procedure(
     FileError
         If the file cannot be read or is not valid TOML.
     InputError
-        For any invalid entry, with the file's name in front.
+        For any invalid entry. The message begins with the file's name.
     """
     file = Path(source)
     content = read_toml(file, "procedure file")
@@ -297,7 +297,7 @@ def _plan(
     if lacking:
         where = ", ".join(f"{NUMBERS}{each}" for each in lacking)
         raise ParameterError(
-            f"[set] needs {where}, which is missing. Set it, or write the value itself",
+            f"[set] needs a value for {where}. Set it with --set, or write the value in [set]",
             name="set",
             valid=where,
         )
@@ -307,8 +307,8 @@ def _plan(
     options = leaf_fields(bench.definition.options)
     if SPEED not in options or options[SPEED].unit.symbol != "m/s":
         raise ParameterError(
-            f"experiment {bench.experiment!r} has no option {SPEED}, so it cannot begin at the "
-            "speed of a stop. Use an experiment that stops a vehicle",
+            f"experiment {bench.experiment!r} has no option {SPEED}, which sets the speed of a "
+            "stop. Use an experiment that stops a vehicle",
             name="experiment",
             value=bench.experiment,
             valid=f"an experiment with the option {SPEED}",
@@ -440,13 +440,14 @@ class _Reader:
         where = f"[[stops]] {quoted(section.name)}{line}"
         if section.name in {each.name for each in before}:
             raise ParameterError(
-                f"{where} occurs twice. Give each entry of [[stops]] its own name",
+                f"{where} occurs twice. Use a different name for each entry of [[stops]]",
                 name="stops",
                 value=section.name,
             )
         if section.judged and not section.limits:
             raise ParameterError(
-                f"{where} has no limit. Add limits, or judged = false if it only heats the brakes",
+                f"{where} has no limit. Add limits, or add judged = false if the stop only heats "
+                "the brakes",
                 name=f"{where} limits",
                 valid="limits, or judged = false",
             )
@@ -501,15 +502,15 @@ class _Reader:
         limits, gaps = self._limits(section, bench, motion, v_0, before)
         if "deceleration" in values and not self.file.demand:
             raise ParameterError(
-                "deceleration needs the options of the demand. Add demand = [...] to the file, "
-                "with the options that the stop adjusts",
+                "deceleration needs demand options. Add demand = [...] to the file, with the "
+                "options that bywire scales to reach the deceleration",
                 name="demand",
             )
         if not motion.brakes and values.keys() & {"T_brake", "interval"}:
             key = next(key for key in ("T_brake", "interval") if key in values)
             raise ParameterError(
                 f"{key} would have no effect because the brakes of {bench.system} do not warm up "
-                f"in this model. Leave {key} out",
+                f"in this model. Remove {key}",
                 name=key,
             )
         return StopPlan(
@@ -533,7 +534,7 @@ class _Reader:
     @staticmethod
     def _speeds(value: Any) -> list[str]:
         speeds = [value] if isinstance(value, str) else value
-        valid = 'a speed such as "60 km/h", or a list of which the lowest applies'
+        valid = 'a speed such as "60 km/h", or a list of speeds, of which the lowest applies'
         if value is None:
             raise ParameterError(f"speed is missing. Add {valid}", name="speed", valid=valid)
         is_list = isinstance(speeds, list | tuple) and speeds
@@ -555,7 +556,7 @@ class _Reader:
     def _require_reached(self, key: str, text: str, v: float) -> None:
         if v > self.v_max:
             most = f"<= v_max = {shown(self.v_max, 'm/s', 'km/h')}"
-            raise not_valid(key, quoted(text), most, "because the vehicle is not faster")
+            raise not_valid(key, quoted(text), most, "the maximum speed of the vehicle")
 
     @staticmethod
     def _share(text: str, name: str) -> float:

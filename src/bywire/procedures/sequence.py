@@ -24,7 +24,7 @@ from bywire.procedures.procedure_file import ProcedurePlan, StopPlan
 Heat = Mapping[str, disc_heat.State]
 """temperatures of the brakes by part"""
 _ADJUSTMENTS = 20  # maximum number of runs that adjust the demand
-_CLOSE = 1e-3  # relative deviation at which the deceleration counts as reached
+_CLOSE = 1e-3  # maximum relative deviation from the required deceleration
 _ROWS = 30  # of an interval
 NOT_SHOWN = "not shown"
 """outcome of a limit for which a number is missing"""
@@ -71,7 +71,7 @@ class Stop:
     warnings
         Warnings of the run.
     begin
-        Time at which the stop begins [s], from the first stop that heats it on.
+        Time at which the stop begins [s], measured from the first stop whose heat affects it.
     course
         Times from then on [s], speeds [m/s] and disc temperatures [K] by name, until the stop ends.
     pause
@@ -178,7 +178,8 @@ def run_stops(
             stops.append(_left_out(each, f"missing: {', '.join(each.lacking)}"))
             state.is_known = False
         elif each.follows and not state.is_known:
-            stops.append(_left_out(each, "an earlier stop, whose heat it needs, was not run"))
+            reason = "an earlier stop was not run, so the brake temperature is unknown"
+            stops.append(_left_out(each, reason))
         else:
             stops += _Stops(plan, each, stops, estimate_error).run(state, progress, done, total)
         done += each.count
@@ -223,7 +224,8 @@ class _Stops:
             state.heat, state.begin, state.length = left, begin, length
             state.is_known = left is not None
             if left is None and k + 1 < repeats:
-                rest = _left_out(plan, f"stop {k + 1}, whose heat it needs, does not end")
+                why = f"stop {k + 1} does not end, so the brake temperature is unknown"
+                rest = _left_out(plan, why)
                 made.append(replace(rest, first=k + 2, count=plan.count - k - 1))
                 break
             progress(plan.name, (done + k + 1) / total)
@@ -251,7 +253,7 @@ class _Stops:
         if not pause > 0.0:
             raise ParameterError(
                 f"[[stops]] {quoted(plan.name)} interval = {shown(plan.interval, 's')} is not "
-                f"valid: it must be > {shown(state.length, 's')}, the duration of the stop before",
+                f"valid: it must be > {shown(state.length, 's')}, the previous stop's duration",
                 name="interval",
                 value=shown(plan.interval, "s"),
                 valid=f"> {shown(state.length, 's')}",
@@ -297,14 +299,14 @@ class _Stops:
             guess = scale * plan.deceleration / reached
             inside = low < guess < high
             scale = guess if inside else 0.5 * (low + high) if high < math.inf else 2.0 * scale
-        what = (
-            "does not reach a standstill. Increase options.duration"
+        why = (
+            "The vehicle does not come to a standstill. Increase options.duration"
             if math.isnan(reached)
-            else f"decelerates with {shown(reached, 'm/s**2')} for any adjusted demand"
+            else f"After {_ADJUSTMENTS} adjustments, it is {shown(reached, 'm/s**2')}"
         )
         raise RunError(
             f"stop {k + 1} of {quoted(plan.name)} cannot be adjusted to a deceleration of "
-            f"{shown(plan.deceleration, 'm/s**2')}: it {what}",
+            f"{shown(plan.deceleration, 'm/s**2')}. {why}",
             name="deceleration",
             value=shown(plan.deceleration, "m/s**2"),
         )
@@ -314,8 +316,8 @@ class _Stops:
     ) -> tuple[Stop, Heat | None, float]:
         """Return a stop, the temperatures at its end, and its duration [s].
 
-        There are no such temperatures if the recording ends before the stop does. ``adjusted``: the
-        run of this stop that adjusted its demand.
+        The temperatures are None if the recording ends before the stop. ``adjusted``: the run of
+        this stop that adjusted its demand.
         """
         plan, motion = self.plan, self._motion
         bench, has_error = self._bench(heat, scale), self.estimate_error and bool(plan.limits)

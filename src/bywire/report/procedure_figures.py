@@ -1,4 +1,4 @@
-"""Figures of a procedure: temperatures over its stops, and the used part of each limit."""
+"""Figures of a procedure: temperatures during its stops, and the utilization of each limit."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ class HeatedStop:
 
 @dataclass(frozen=True)
 class UsedLimit:
-    """Part of a limit that a stop uses.
+    """Utilization of a limit by a stop.
 
-    ``label``: stop and figure; ``share``: value over an upper limit, or a lower limit over the
-    value, in percent; ``outcome``: the verdict.
+    ``label``: stop and key figure; ``share``: ratio of the value to an upper limit, or of a lower
+    limit to the value, in percent; ``outcome``: the verdict.
     """
 
     label: str
@@ -75,7 +75,7 @@ def temperature_figure(groups: Sequence[Sequence[HeatedStop]]) -> Figure:
 
 
 def limit_figure(limits: Sequence[UsedLimit]) -> Figure:
-    """Draw the used part of each limit; bars beyond the dotted line miss it."""
+    """Draw the utilization of each limit. Bars that extend past the dotted line miss it."""
     figure, (axes,) = style.new_figure(0.8 + _ROW * len(limits), [1.0])
     colors = {"met": style.GREEN, "missed": style.VERMILLION}
     for k, each in enumerate(limits):
@@ -84,5 +84,5 @@ def limit_figure(limits: Sequence[UsedLimit]) -> Figure:
     axes.invert_yaxis()
     look = style.STROKES[Role.LIMIT]
     axes.axvline(100.0, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth)
-    axes.set_xlabel("used part of the limit [%]")
+    axes.set_xlabel("utilization of the limit [%]")
     return figure

@@ -35,9 +35,9 @@ from bywire.simulation.c_runtime import CUDA
 from bywire.simulation.compiler import digest_of, is_intact, sha256, usable_folder
 from bywire.simulation.native import pointer
 
-# Fused products and sums would round differently from the processor's kernels. The second option is
-# necessary because the source does not declare each function as a device function. C++20 has
-# designated initializers, as C.
+# Fused multiply-add operations would round differently from the processor's kernels. The second
+# option is necessary because the source does not declare each function as a device function. C++20
+# has designated initializers, like C.
 OPTIONS = ("--fmad=false", "--device-as-default-execution-space", "--std=c++20")
 OTHERWISE = "or use engine = 'auto', which computes on this machine's processor"
 
@@ -224,8 +224,8 @@ class CudaDevice:
         )
         self._capability = 10 * major + minor
         self.is_exclusive = mode == _EXCLUSIVE and not self._attribute("MPS_ENABLED")
-        # A thread that waits leaves its core to other work. The flag is a wish: another library of
-        # this process may have chosen already.
+        # A waiting thread leaves its core to other work. The flag is only a request, because
+        # another library of this process may already have set the flags.
         flagged = driver.cuDevicePrimaryCtxSetFlags(self._device, _BLOCKING)
         if int(flagged[0]) != _ALREADY_ACTIVE:
             self._checked(flagged)
@@ -264,9 +264,9 @@ class CudaDevice:
     def host_array(self, shape: tuple[int, ...]) -> Array:
         """Return an uninitialized array in page-locked memory, which the device fills directly.
 
-        The system maps new memory page by page, which takes longer than to fill it. So the memory
-        of the last arrays that nothing refers to any more is used again. Memory that cannot be
-        locked is ordinary memory.
+        The system maps new memory page by page, which takes longer than filling it. This method
+        therefore reuses the memory of recent arrays to which no reference remains. If memory cannot
+        be locked, the array uses ordinary memory.
         """
         size = max(math.prod(shape) * FLOAT, 8)
         with self._current():
@@ -304,7 +304,7 @@ class CudaDevice:
 
     @contextmanager
     def working(self) -> Iterator[Memory]:
-        """Reserve the device and memory on it; the memory is freed at the end."""
+        """Reserve the device and memory on it. The memory is freed at the end."""
         with self._current():
             memory = Memory(self._driver, self._checked)
             try:
@@ -317,7 +317,7 @@ class CudaDevice:
 
     @contextmanager
     def _current(self) -> Iterator[None]:
-        """Reserve the device for the calling thread. This costs no time: it has only one queue."""
+        """Reserve the device for the calling thread. The device has only one queue anyway."""
         with self._lock:
             self._checked(self._driver.cuCtxSetCurrent(self._context))
             yield
@@ -340,7 +340,7 @@ class CudaDevice:
         raise self._failed(status)
 
     def _full(self, size: int) -> DeviceError:
-        """Return the error for missing memory; ``size``: requested bytes, 0 if unknown."""
+        """Return the error for insufficient memory; ``size``: requested bytes, 0 if unknown."""
         unknown, *sizes = self._driver.cuMemGetInfo()  # this call may also fail
         left = (
             ""
@@ -349,8 +349,8 @@ class CudaDevice:
         )
         need = f"{size / _MEGA:.3g} MB" if size else "memory"
         return DeviceError(
-            f"{self.label} cannot allocate {need}{left}. End other programs on this graphics "
-            f"processor, select another one with {VARIABLE}, {OTHERWISE}",
+            f"{self.label} cannot allocate {need}{left}. Close other programs that use this "
+            f"graphics processor, select another one with {VARIABLE}, {OTHERWISE}",
             name=self.label,
             value=need,
         )
@@ -369,25 +369,26 @@ class CudaDevice:
         )
 
     def _failed(self, status: Any) -> DeviceError:
-        """Return the error for a device that does not compute, or no longer."""
+        """Return the error for a device that cannot compute, or has stopped computing."""
         code, why = int(status), f"({status.name})"
         if code == _IN_USE:
             text = (
                 f"{self.label} is in use by another process, and its compute mode does not allow "
                 f"another one {why}. End that process, which nvidia-smi lists, select another "
-                f"graphics processor with {VARIABLE}, or have an administrator type 'nvidia-smi "
+                f"graphics processor with {VARIABLE}, ask an administrator to run 'nvidia-smi "
                 f"-c DEFAULT', {OTHERWISE}"
             )
         elif code in _DAMAGED:
             text = (
-                f"{self.label} has an uncorrectable memory error {why}. {_again()}, and have an "
-                f"administrator type 'nvidia-smi --gpu-reset' if the error returns, {OTHERWISE}"
+                f"{self.label} has an uncorrectable memory error {why}. {_again()}. If the error "
+                "recurs, ask an administrator to run 'nvidia-smi --gpu-reset', "
+                f"{OTHERWISE}"
             )
         elif code == _TOO_LONG:
             text = (
-                f"the system ended a kernel on {self.label}, which took too long for a graphics "
-                f"processor with a display {why}. Select another graphics processor with "
-                f"{VARIABLE}, {OTHERWISE}"
+                f"the system ended a kernel on {self.label}, because the kernel took too long for "
+                f"a graphics processor that drives a display {why}. Select another graphics "
+                f"processor with {VARIABLE}, {OTHERWISE}"
             )
         else:
             given = self._driver.cuGetErrorString(status)  # this call may also fail
@@ -397,7 +398,7 @@ class CudaDevice:
 
 
 def _again() -> str:
-    """Return the advice after a failure, which a process's later calls repeat."""
+    """Return the advice after a failure, which also affects later calls in the same process."""
     return "Rerun the command" if is_command_line() else "Start Python again and rerun the call"
 
 
@@ -438,9 +439,9 @@ class Memory:
             self._checked(self._driver.cuMemcpyHtoD(place, pointer(array).value, array.nbytes))
 
     def get(self, place: Any, array: NDArray[Any]) -> None:
-        """Copy consecutive numbers at an address into an array with any distances.
+        """Copy consecutive numbers at an address into an array with any strides.
 
-        Lines of numbers at equal distances are a single copy.
+        Lines of numbers with equal strides need only one copy.
         """
         if not array.nbytes:
             return
@@ -526,8 +527,8 @@ def find_device() -> CudaDevice:
         reason = "" if not int(status) else status.name
         if int(status) in _MISMATCH:
             raise DeviceError(
-                f"the library of NVIDIA's driver does not fit the driver that the system has "
-                f"loaded ({reason}). Restart the machine to complete an update of the driver, "
+                f"the library of NVIDIA's driver does not match the driver that the system has "
+                f"loaded ({reason}). Restart the machine to complete the driver update, "
                 f"{OTHERWISE}",
                 name="driver",
                 value=reason,

@@ -31,7 +31,7 @@ from bywire.studies.plan import StudyPlan
 from bywire.studies.store import CASE, CHOICE, FAILURE, StudyStore, case_bench
 
 _EDGES = (0.01, 0.25)
-"""probabilities of the quantiles of the probing cases; the opposite quantiles also count"""
+"""probabilities of the quantiles of the probing cases, which also use the opposite quantiles"""
 _ROWS = 8  # probing cases for each of them
 _CHECKED = 32  # cases that are rerun with other steps
 
@@ -40,7 +40,7 @@ def with_step(plan: StudyPlan, store: StudyStore, progress: Progress | None = No
     """Return a study with the step for the error that its bench states, if it states one.
 
     The bench itself and the `probing_cases` decide. A study that is already in its folder keeps its
-    step, because another machine may round the errors in another way.
+    step, because another machine may round the errors differently.
 
     Raises
     ------
@@ -78,7 +78,8 @@ def probing_cases(plan: StudyPlan) -> list[dict[str, Any]]:
 
     Two-level designs combine the 1 % and 99 % quantiles, and the quartiles (R. L. Plackett and J.
     P. Burman, The design of optimum multifactorial experiments, Biometrika 33, 1946). Among seven
-    quantities, each pair occurs in all combinations. Discrete quantities take their values in turn.
+    quantities, each pair occurs in all combinations. Discrete quantities cycle through their
+    values.
     """
     from scipy import special
 
@@ -123,7 +124,7 @@ class ErrorCheck:
 
     @cached_property
     def largest(self) -> Mapping[str, float]:
-        """Largest error of each key figure that is defined in a case."""
+        """Maximum error of each key figure that is defined in at least one case."""
         known = {n: errors[~np.isnan(errors)] for n, errors in self.each.items()}
         return {name: float(errors.max()) for name, errors in known.items() if errors.size}
 
@@ -144,7 +145,7 @@ class ErrorCheck:
             return ""
         return (
             f"the numerical error exceeds simulation.error = {error_text(self.stated)} in some of "
-            f"{self.cases} checked cases: {', '.join(texts)}. State a smaller error"
+            f"the {self.cases} checked cases: {', '.join(texts)}. State a smaller error"
         )
 
     @property
@@ -155,7 +156,7 @@ class ErrorCheck:
         name = max(self.largest, key=lambda each: self.largest[each], default="")
         of = f" of {percent_text(self.largest[name])} ({name})" if name else ""
         return (
-            f"checked the numerical error in {self.cases} cases with other steps: the largest "
+            f"in {self.cases} cases that bywire reran with other steps, the maximum numerical "
             f"error{of} is within simulation.error = {error_text(self.stated)}"
         )
 

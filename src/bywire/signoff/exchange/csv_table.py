@@ -46,7 +46,7 @@ class _Row:
 
 
 class CsvTable(RequirementsFile):
-    """Table whose first row contains the names of the columns.
+    """Table whose first row contains the column names.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ class CsvTable(RequirementsFile):
         rows = [row for row in self._rows(start, self._separator) if not row.is_blank]
         if not rows:
             raise FileError(
-                f"{file}, line 1: the table is empty. Its first row must contain the names of the "
-                "columns, such as id and text",
+                f"{file}, line 1: the table is empty. Its first row must contain the column names, "
+                "such as id and text",
                 name=str(file),
             )
         self._head, self._body = rows[0], rows[1:]
@@ -102,7 +102,7 @@ class CsvTable(RequirementsFile):
         ]
 
     def with_results(self, results: Mapping[int, Result]) -> bytes:
-        """Return the table with results in columns of their own, the last ones if they are new."""
+        """Return the table with results in separate columns. New columns come last."""
         edits = self._edits(self._head, {name: name for name in RESULT_ATTRIBUTES})
         for k, row in enumerate(self._body):
             texts = results[k].by_attribute() if k in results else {}
@@ -177,8 +177,8 @@ class CsvTable(RequirementsFile):
         cell = _QUOTED.match(self._text, position)
         if cell is None:
             raise FileError(
-                f"{self.file}, line {line}: the quotation mark that opens a cell here is never "
-                "closed. Add it, or remove both",
+                f"{self.file}, line {line}: a quoted cell begins here, but its closing quotation "
+                "mark is missing. Add it, or remove the opening quotation mark",
                 name=str(self.file),
             )
         after = self._text[cell.end() : cell.end() + 1]
@@ -186,7 +186,7 @@ class CsvTable(RequirementsFile):
             line += len(_NEWLINE.findall(cell[0]))
             raise FileError(
                 f"{self.file}, line {line}: {quoted(after)} follows a closing quotation mark. "
-                "Write quotation marks within a quoted cell twice",
+                "Double each quotation mark inside a quoted cell",
                 name=str(self.file),
                 value=quoted(after),
             )
@@ -217,9 +217,9 @@ class CsvTable(RequirementsFile):
         width = len(self._titles)
         if any(cell.text.strip() for cell in row.cells[width:]):
             raise FileError(
-                f"{self.file}, line {row.line}: {counted(len(row.cells), 'cell')}, but the first "
-                f"row has {width} (separated by {_SEPARATORS[self._separator]}). Put texts that "
-                "contain the separator in quotation marks",
+                f"{self.file}, line {row.line}: this row has {counted(len(row.cells), 'cell')}, "
+                f"but the first row has {width} (separator: {_SEPARATORS[self._separator]}). Put "
+                "text that contains the separator in quotation marks",
                 name=str(self.file),
                 value=str(len(row.cells)),
                 valid=str(width),
@@ -232,21 +232,21 @@ def _decoded(file: Path, content: bytes) -> str:
     except UnicodeDecodeError as error:
         line = 1 + content[: error.start].count(b"\n")
         raise FileError(
-            f"{file}, line {line} is not UTF-8 text. Save the table again, in spreadsheets as 'CSV "
-            "UTF-8'",
+            f"{file}, line {line} is not UTF-8 text. Save the table again (in a spreadsheet: as "
+            "'CSV UTF-8')",
             name=str(file),
             valid="UTF-8",
         ) from None
     if "\0" in text:
         line = 1 + text[: text.index("\0")].count("\n")
         raise FileError(
-            f"{file}, line {line} contains a null character, so this is not a table. Save it as "
-            "CSV",
+            f"{file}, line {line} contains a null character, so the file is not a CSV table. Save "
+            "the table as CSV",
             name=str(file),
         )
     return text
 
 
 def _harmless(text: str) -> str:
-    """Return text that no spreadsheet takes for a formula; the apostrophe marks text there."""
+    """Return text with an apostrophe if a spreadsheet would interpret the text as a formula."""
     return f"'{text}" if text.lstrip().startswith(_FORMULA) else text

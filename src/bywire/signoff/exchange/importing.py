@@ -73,7 +73,7 @@ class Imported:
         return f"{self.file.stem}-verdicts{self.file.suffix}"
 
     def with_results(self, results: Mapping[str, Result]) -> bytes:
-        """Return the file with results by id. Everything else in it remains as it is."""
+        """Return the file with results by id. Everything else in the file remains unchanged."""
         return self.content.with_results(
             {self.numbers[id]: result for id, result in results.items() if id in self.numbers}
         )
@@ -89,7 +89,7 @@ def imported_from(file: Path, names: AttributeNames, only: Mapping[str, Any]) ->
     names
         Names of attributes, where they are not the usual ones.
     only
-        Values of attributes that only requirements have, for files with other entries.
+        Values of attributes that only requirements have, for files that contain other entries.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def imported_from(file: Path, names: AttributeNames, only: Mapping[str, Any]) ->
         valid = ", ".join(_FORMATS)
         advice = _OTHERS.get(suffix, "Export the requirements in one of these formats")
         raise FileError(
-            f"bywire cannot read requirements from {file}: valid suffixes are {valid}. {advice}",
+            f"bywire cannot read requirements from {file}. Valid suffixes are {valid}. {advice}",
             name="requirements",
             value=suffix,
             valid=valid,
@@ -112,7 +112,8 @@ def imported_from(file: Path, names: AttributeNames, only: Mapping[str, Any]) ->
     found = list(read.statements())
     if not found:
         raise ParameterError(
-            f"{file} contains no requirement. Add one, or correct [only]", name="requirements"
+            f"{file} contains no requirement. Add a requirement, or correct [only]",
+            name="requirements",
         )
     numbers: dict[str, int] = {}
     for number, each in found:
@@ -148,15 +149,15 @@ class _Reader:
         if not names and field in ("id", "text"):
             missing = unknown_of_few(self._content.attribute, usual[0], self._known.values())
             raise missing.reworded(
-                f"{self._head}: no {self._content.attribute} {usual[0]!r}. Specify the "
-                f"{self._content.attribute} in the sign-off file, in the section [attributes], for "
-                f"example {field} = {next(iter(self._known.values()), 'NAME')!r}. Valid names are "
-                f"{missing.valid}"
+                f"{self._head}: the file has no {self._content.attribute} {usual[0]!r}. Specify "
+                f"another {self._content.attribute} in the section [attributes] of the sign-off "
+                f"file, for example {field} = {next(iter(self._known.values()), 'NAME')!r}. Valid "
+                f"names are {missing.valid}"
             )
         return tuple(names)
 
     def _attribute(self, name: str, where: str) -> str:
-        """Return a name in lower case, by which entries have their values."""
+        """Return a name in lower case, under which entries store their values."""
         if name.casefold() not in self._known:
             error = unknown_of_few(
                 f"{self._content.attribute} in {where}", name, self._known.values()
@@ -221,8 +222,8 @@ class _Reader:
                 attribute = self._known[name]
                 raise FileError(
                     f"{Place(self._content.file, line)}: {attribute!r} contains a binary "
-                    f"attachment ({what}), which bywire cannot read. Describe it in words, or "
-                    "export the file without it",
+                    f"attachment ({what}), which bywire cannot read. Describe the attachment in "
+                    "words, or export the file without it",
                     name=attribute,
                     value=what,
                 )
@@ -234,5 +235,5 @@ class _Reader:
 def _values(key: str, value: Any) -> frozenset[str]:
     values = [value] if isinstance(value, str) else value
     if not isinstance(values, list) or not all(isinstance(each, str) for each in values):
-        raise not_valid(f"[only] {key}", quoted(value), "a text or a list of texts")
+        raise not_valid(f"[only] {key}", quoted(value), "a string or a list of strings")
     return frozenset(each.strip().casefold() for each in values)

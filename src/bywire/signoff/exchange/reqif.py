@@ -58,7 +58,7 @@ class _Definition:
 
 
 class ReqifFile(RequirementsFile):
-    """ReqIF file, in which every object of the specifications is a requirement or a heading.
+    """ReqIF file, in which every object in the specifications is a requirement or a heading.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class ReqifFile(RequirementsFile):
 
     @property
     def head_line(self) -> int:
-        """Line of the types of objects."""
+        """Line of the object types."""
         return (self._core.first("SPEC-TYPES") or self._core).line
 
     @property
@@ -253,8 +253,8 @@ class ReqifFile(RequirementsFile):
         if definition.name in RESULT_ATTRIBUTES and definition.kind not in _VALUES:
             raise self._rejected(
                 element,
-                f"the attribute {quoted(definition.name)} of bywire's results is not a text. "
-                "Remove it",
+                f"the attribute {quoted(definition.name)}, which contains bywire's results, is not "
+                "text. Remove the attribute",
                 definition.name,
             )
         return definition
@@ -284,7 +284,7 @@ class ReqifFile(RequirementsFile):
     # --- Writing
 
     def _new_definitions(self, types: set[str], date: str) -> Iterator[Edit[bytes]]:
-        """Yield the changes that define the attributes of results in some types of objects."""
+        """Yield the changes that define result attributes in some object types."""
         changed = f'LAST-CHANGE="{date}T00:00:00Z"'
         is_new = False
         for identifier in self._types:
@@ -321,7 +321,7 @@ class ReqifFile(RequirementsFile):
             )
 
     def _new_values(self, element: Element, result: Result | None) -> Iterator[Edit[bytes]]:
-        """Yield the changes of an object; without a result, they empty an earlier one."""
+        """Yield the changes to an object. Without a result, they clear an earlier result."""
         texts = result.by_attribute() if result is not None else {}
         kind = self._type(element)
         definitions = {each.name: each for each in self._definitions[kind]}
@@ -384,7 +384,7 @@ def _reference(value: Element) -> str:
 
 
 def _own_identifier(name: str, kind: str) -> str:
-    """Return the identifier of a definition for results. That of the type makes it unique."""
+    """Return the identifier of a definition for results. The type's identifier makes it unique."""
     return f"{_prefix(name)}{kind}"
 
 
@@ -405,7 +405,7 @@ _VALUES: Mapping[str, Callable[[str, str], tuple[str, str]]] = {
     "STRING": _string_value,
     "XHTML": _xhtml_value,
 }
-"""kinds of attributes for results: bywire's own, and what some tools turn them into"""
+"""kinds of result attributes: bywire's own kind, and the kind to which some tools convert it"""
 
 
 def _value_xml(mark: str, definition: _Definition, text: str) -> str:
@@ -432,7 +432,7 @@ def _attachments(element: Element) -> Iterator[Element]:
 
 
 def _plain_text(element: Element) -> str:
-    """Return formatted text without its format, one line per paragraph."""
+    """Return formatted text without its formatting, one line per paragraph."""
     lines = "".join(_pieces(element)).split("\n")
     return "\n".join(line for each in lines if (line := " ".join(each.split())))
 

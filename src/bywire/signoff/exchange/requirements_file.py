@@ -12,7 +12,7 @@ LARGEST = 20_000_000
 """maximum size of a requirements file in bytes, checked before parsing"""
 
 LONGEST = 32_000
-"""maximum characters of a result; a spreadsheet's cell has at most 32,767"""
+"""maximum number of characters in a result; a spreadsheet's cell has at most 32,767"""
 
 _PREFIX = "bywire."
 
@@ -26,13 +26,13 @@ class Result:
     verdict
         The verdict.
     reason
-        Reasons for a verdict that is not ``met``.
+        Reasons for a verdict other than ``met``.
     evidence
         Titles of the evidence.
     value, limit, margin
         Figures of the evidence with their units.
     date
-        Day of the sign-off.
+        Date of the sign-off.
     """
 
     verdict: str
@@ -53,7 +53,7 @@ class Result:
 
 
 RESULT_ATTRIBUTES = tuple(_PREFIX + each.name for each in fields(Result))
-"""columns or attributes of the results; the prefix tells them apart from those of the file"""
+"""columns or attributes of the results; the prefix distinguishes them from those of the file"""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class RequirementsFile(ABC):
     """
 
     attribute = "attribute"
-    """word of the format for an attribute"""
+    """the format's word for an attribute"""
 
     candidates: Mapping[str, tuple[str, ...]]
     """usual attributes for each field of a requirement, the preferred one first"""
@@ -118,7 +118,7 @@ class RequirementsFile(ABC):
     def with_results(self, results: Mapping[int, Result]) -> bytes:
         """Return the file with results, by the number of the entry from 0.
 
-        Everything else remains as it is, and replaces results of an earlier sign-off.
+        The results replace those of an earlier sign-off. Everything else remains unchanged.
         """
 
 

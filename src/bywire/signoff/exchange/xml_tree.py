@@ -1,7 +1,7 @@
-"""XML of untrusted files as a tree, in which every element knows its line and its place.
+"""Untrusted XML files as trees, in which every element has its line and its place in the file.
 
-Files with a document type are rejected. Therefore, entities never expand, and nothing outside the
-file is read.
+The parser rejects files with a document type declaration. Therefore, entities never expand, and the
+parser reads nothing outside the file.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Element:
         return [each for each in self.content if isinstance(each, Element)]
 
     def every(self, *names: str) -> Iterator[Element]:
-        """Yield the elements on a path of names, each directly in the one before; * is any."""
+        """Yield the elements on a path of names, each inside the previous one; * is any name."""
         first, *rest = names
         for each in self.elements:
             if first in ("*", each.name):
@@ -102,7 +102,8 @@ def parse_xml(file: Path, content: bytes) -> XmlFile:
     Raises
     ------
     FileError
-        With file and line, if it is not XML, contains a document type, or is nested too deeply.
+        With file and line, if the content is not XML, contains a document type declaration, or is
+        nested too deeply.
     """
     encoding = _encoding(content)
     try:
@@ -127,7 +128,7 @@ def _encoding(content: bytes) -> str:
 
 
 class _Reader:
-    """Events of the parser, from which the tree is made."""
+    """Parser events, from which this class builds the tree."""
 
     def __init__(self, file: Path, data: bytes) -> None:
         self._file, self._data = file, data
@@ -145,10 +146,10 @@ class _Reader:
             self._parser.Parse(self._data, True)
         except expat.ExpatError as error:
             last = self._open[-1] if self._open else None
-            where = f" (in <{last.tag}> of line {last.line})" if last else ""
+            where = f", in <{last.tag}> from line {last.line}" if last else ""
             raise FileError(
-                f"{self._file}, line {error.lineno}: this is not valid XML: "
-                f"{expat.errors.messages[error.code]}{where}. Export the file again",
+                f"{self._file}, line {error.lineno}: the file is not valid XML "
+                f"({expat.errors.messages[error.code]}{where}). Export the file again",
                 name=str(self._file),
             ) from None
         assert self._root is not None
@@ -177,8 +178,8 @@ class _Reader:
 
     def _doctype(self, *_: object) -> None:
         self._reject(
-            "the file contains a document type (<!DOCTYPE ...>), which could expand or read other "
-            "files. Remove it"
+            "the file contains a document type declaration (<!DOCTYPE ...>), which could read "
+            "other files. Remove the declaration"
         )
 
     def _reject(self, reason: str) -> NoReturn:
