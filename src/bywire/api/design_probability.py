@@ -432,7 +432,8 @@ class BenchProbability:
         ]
         if findings.failed:
             lines.append(
-                f"{findings.failed} of these cases have no result, and do not meet any requirement: "
+                f"{findings.failed} of these cases have no result, and do not meet any "
+                "requirement: "
                 f"{findings.reasons[0].text}"
             )
         return lines
