@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from bywire.analysis.loop_figures import LOOP_FIGURES
@@ -28,11 +28,15 @@ _PAIRS = 6
 
 
 def verification_parts(
-    case: LoopCase, nominal: Mapping[str, float], tried: Verification
+    case: LoopCase,
+    nominal: Mapping[str, float],
+    tried: Verification,
+    with_probability: Collection[str] = (),
 ) -> list[Part]:
     """Return tables and text lines on the linear design and the retuned gains on the bench.
 
-    ``nominal`` contains the figures of the linear design's nominal model.
+    ``nominal`` contains the figures of the linear design's nominal model, and ``with_probability``
+    the texts of requirements that must also be met over distributions.
     """
     columns = [("linear design", tried.linear)]
     if tried.tuning is not None:
@@ -65,6 +69,7 @@ def verification_parts(
         room = 100.0 * tried.final.room(text)
         also = "also enforced, " if text in kept else ""
         where = judged_on(tried.final, text)
+        where += ", without random variation" if text in with_probability else ""
         parts.append(f"{also}{where}: {text} {verdict} ({room:+.1f} % of the limit)")
     conflict = tried.conflict()
     if conflict is not None:
@@ -318,7 +323,8 @@ def as_parts(
         for conflict in design.conflicts
     ]
     if tried is not None:
-        parts += verification_parts(case, design.nominal, tried)
+        probable = {str(each) for each in requirements if each.probability is not None}
+        parts += verification_parts(case, design.nominal, tried, probable)
     return parts
 
 

@@ -526,6 +526,8 @@ def _over_all(
     """Search over the nominal model, and add the worst other model until none is worse."""
     problem, everything = search.problem, range(len(search.problem.cases))
     begin = starts_of(problem, starts, seed)
+    # A quantile has more local optima than a minimum, so each of its searches has several starts.
+    again = begin if any(each.probability is not None for each in problem.requirements) else []
     for _ in range(_ROUNDS):
         count = len(search.cases)
         models = "" if count == 1 else f", {count} models"
@@ -541,7 +543,7 @@ def _over_all(
         added = [k for k in (*missing, worst) if k not in search.cases]
         if slacks[worst] >= search.slack - 1e-4 or not added:
             return
-        begin = [search.best]
+        begin = [search.best, *again]
         search.cases, search.slack, search.seen = [*search.cases, *added], -np.inf, []
 
 

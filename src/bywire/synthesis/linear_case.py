@@ -97,12 +97,13 @@ def _read(text: str, has_probability: bool) -> Limit:
     if word not in _BY_WORD:
         raise unknown_name("figure of a loop", word, LOOP_FIGURES)
     figure, is_least = _BY_WORD[word], compare in (">=", ">")
-    written, probability = split_probability(
+    limit, probability = split_probability(
         figure.name,
-        written,
+        f"{compare} {written}",
         f"requirement {figure.name}",
         has_probability=has_probability,
     )
+    written = limit.removeprefix(compare).strip()
     bound = _bound(written, figure)
     # Every loop, or no loop, meets a limit at the end of the possible range.
     possible = figure.low <= bound <= figure.high and not (is_least and bound >= figure.high)
