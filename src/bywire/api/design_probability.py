@@ -433,8 +433,7 @@ class BenchProbability:
         if findings.failed:
             lines.append(
                 f"{findings.failed} of these cases have no result, and do not meet any "
-                "requirement: "
-                f"{findings.reasons[0].text}"
+                f"requirement: {findings.reasons[0].text}"
             )
         return lines
 
