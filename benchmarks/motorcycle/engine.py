@@ -64,7 +64,7 @@ def single_and_sensitivities(par: MotorcycleParameters) -> list[Result]:
             0.9,
             "ratio",
             "one hard-braking run of 1.2 s, all outputs, relative to hand-written C; same "
-            "compiler and flags, one call each, minimum processor times",
+            "compiler and flags, one call each, minimum CPU times",
         ),
         Result(
             "single.realtime_factor",

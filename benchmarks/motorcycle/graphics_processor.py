@@ -1,4 +1,4 @@
-"""Ensembles and studies on a graphics processor, compared with all cores beside it."""
+"""Ensembles and studies on a graphics processor, compared with all cores of the same machine."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class _Row:
         except (_SkippedRowError, DeviceError) as reason:
             return [Result(self.name, None, self.unit, self.goal, None, str(reason))]
         except subprocess.TimeoutExpired:
-            note = f"skipped, because the {SECONDS:g} s of this part were over"
+            note = f"skipped, because the time limit of {SECONDS:g} s for this part was reached"
             return [Result(self.name, None, self.unit, self.goal, None, note)]
         except Exception as error:  # of any type, because other rows do not depend on it
             return [failed(self.name, error, self.unit, self.goal)]
@@ -125,7 +125,7 @@ def measured() -> Iterator[Result]:
         device = find_device()
     except (DeviceError, ParameterError) as error:
         reason = str(error).replace(f", {OTHERWISE}", "")
-        yield Result("gpu", None, "1", note=f"no row of this part is measured: {reason}")
+        yield Result("gpu", None, "1", note=f"no row of this part was measured: {reason}")
         return
     yield Result(
         "gpu.start",
@@ -232,7 +232,8 @@ def _ensemble(run: Run, cases: int, at_cores: dict[int, float], clock: _Clock) -
         at_cores[beside] = beside / min(interleaved({"lanes": lanes}, _ROUNDS)["lanes"])
     name, rate = f"gpu.ensemble_{cases}", cases / seconds
     note = (
-        f"hard-braking runs per second, wall time, one signal fetched; {at_cores[beside]:.3g} 1/s "
+        "hard-braking runs per second, wall time, with one fetched signal; "
+        f"{at_cores[beside]:.3g} 1/s "
         f"in lanes on {worker_count()} cores ({beside} runs)"
     )
     result = (
@@ -241,7 +242,7 @@ def _ensemble(run: Run, cases: int, at_cores: dict[int, float], clock: _Clock) -
         else Result(name, rate, "1/s", note=note)
     )
     kernel = Result(
-        f"gpu.kernel_{cases}", cases / alone, "1/s", note="the same, time of the kernel alone"
+        f"gpu.kernel_{cases}", cases / alone, "1/s", note="same quantity, for the kernel alone"
     )
     return [result, kernel]
 

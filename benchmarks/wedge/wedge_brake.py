@@ -84,7 +84,7 @@ def single(par: WedgeParameters) -> list[Result]:
             "ratio",
             f"one run of Fig. 7, {run.duration:g} s, all outputs, relative to hand-written C "
             f"with a fully iterated implicit midpoint, {passes:.2f} passes per substep; same "
-            "compiler and flags, one call each, minimum processor times",
+            "compiler and flags, one call each, minimum CPU times",
         ),
         Result(
             "wedge.single.realtime_factor",

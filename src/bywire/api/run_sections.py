@@ -69,7 +69,7 @@ def choice_texts(bench: Bench) -> list[str]:
     reached = percent_text(choice.reached)
     return [
         f"step {shown(choice.step, 's', 'us')}, chosen for simulation.error = "
-        f"{error_text(choice.stated)} (largest estimated error{of}: {reached}, {choice.figure})"
+        f"{error_text(choice.stated)} (maximum estimated error{of}: {reached}, {choice.figure})"
     ]
 
 

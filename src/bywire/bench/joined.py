@@ -127,7 +127,7 @@ def join(
     """Return benches with other parameters, which the experiment sets up only once.
 
     The experiment computes with the numbers of all cases at a time (`bywire.core.several`). The
-    first and the last bench are also set up alone, and must agree in every bit.
+    first and the last bench are also set up alone, and must agree bit for bit.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def _column_wise(numbers: Sequence[Any], count: int) -> Array:
 
 
 def _require_equal(case: Case, alone: Case, run: Run, table: RunTable, k: int) -> None:
-    """Require that a joined case equals the same case alone, in every bit.
+    """Require that a joined case is bit-identical to the same case alone.
 
     Raises
     ------
@@ -229,6 +229,6 @@ def _require_equal(case: Case, alone: Case, run: Run, table: RunTable, k: int) -
 
 
 def _equal(joined: Array, single: Any) -> bool:
-    """Return whether numbers are equal in every bit."""
+    """Return whether numbers are bit-identical."""
     numbers: NDArray[np.float64] = np.array(single, dtype=float)
     return joined.shape == numbers.shape and joined.tobytes() == numbers.tobytes()

@@ -255,7 +255,7 @@ def split_probability(
         return text, None
     if not has_probability:
         raise ParameterError(
-            f"{subject} = {quoted(text)}: only requirements on the cases of a study have a "
+            f"{subject} = {quoted(text)}: only requirements of a study can have a "
             f"probability. Write {quoted(split[1])}",
             name=figure,
             value=quoted(text),

@@ -141,7 +141,7 @@ class RunGroup(Sequence[Trajectory]):
         return None if isinstance(self.values, np.ndarray) else self.values
 
     def close(self) -> None:
-        """Free rows that a graphics processor holds, which cannot be fetched any more."""
+        """Free rows that a graphics processor holds, which can no longer be fetched."""
         if not isinstance(self.values, np.ndarray):
             self.values.close()
 

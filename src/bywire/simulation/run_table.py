@@ -16,7 +16,7 @@ from bywire.simulation.run import Run, contact_doubts
 
 @dataclass(frozen=True)
 class RunTable(Sequence[Run]):
-    """Runs of one model, structure and plan without changes, whose stimuli differ in noise at most.
+    """Runs of one model, structure and plan without changes, whose stimuli differ only in noise.
 
     Parameters
     ----------

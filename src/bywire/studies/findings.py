@@ -187,9 +187,9 @@ class Judgment:
         The requirement.
     share
         Fraction of cases that meet it, with the interval of the probability. Cases too close to the
-        limit count for neither side.
+        limit are counted neither as meeting nor as missing it.
     undecided
-        Number of cases closer to the limit than the numerical error of their figure.
+        Number of cases whose difference from the limit is smaller than the numerical error.
     outcome
         Whether it is met with the required probability, or in all cases without a probability.
     worst
@@ -200,7 +200,7 @@ class Judgment:
     known, known_met
         Number of cases with a finite figure, and of those that meet the requirement.
     running
-        Fraction of the first cases that meet it, for rising numbers of cases.
+        Fraction of the first cases that meet it, for increasing numbers of cases.
     failure
         Probability that the requirement is missed, in a study of rare failures, where fractions of
         cases are not probabilities.
@@ -224,7 +224,8 @@ def judgment_of(tally: DemandTally, confidence: float) -> Judgment:
     Parameters
     ----------
     tally
-        Counted cases. Cases closer to the limit than the numerical error count for neither side.
+        Counted cases. Cases whose difference from the limit is smaller than the numerical error are
+        counted neither as meeting nor as missing it.
     confidence
         Confidence of the interval, between 0 and 1.
     """
@@ -386,7 +387,7 @@ class Findings:
 
     @property
     def ends(self) -> Mapping[str, tuple[float, float]]:
-        """Least and largest value of each varied number [SI], and of each defined key figure."""
+        """Minimum and maximum of each varied number [SI], and of each defined key figure."""
         figures = {each.name: (each.least, each.largest) for each in self.spreads}
         return self._survey.ends | figures
 
@@ -552,6 +553,6 @@ class Findings:
         return 0.0 if math.isnan(error) else error
 
     def is_close(self, demand: Limit, row: int) -> bool:
-        """Return whether a case is closer to a limit than its figure's numerical error."""
+        """Return whether the numerical error of a case exceeds its difference from a limit."""
         figure = np.asarray(self.row(row)[demand.figure], dtype=float)
         return bool(demand.is_near(figure, self._error(demand.figure)))

@@ -52,7 +52,7 @@ def _allowed_workers(workers: int | None, chunks: int) -> int | None:
     if label and workers is not None and workers > 1:
         raise ParameterError(
             f"workers = {workers} is not valid: it must be 1, because the compute mode of {label} "
-            f"allows only one process. Remove {option('workers')}, or have an administrator type "
+            f"allows only one process. Remove {option('workers')}, or ask an administrator to run "
             "'nvidia-smi -c DEFAULT'",
             name=option("workers"),
             value=str(workers),

@@ -267,7 +267,7 @@ def _correlation(x: Array, y: Array) -> float:
 
 
 def running_sizes(cases: int, count: int = 60) -> NDArray[np.int64]:
-    """Return rising numbers of first cases, for the convergence of an estimate."""
+    """Return increasing numbers of first cases, for the convergence of an estimate."""
     return np.unique(np.geomspace(1, max(cases, 1), count).astype(np.int64))
 
 
@@ -326,7 +326,7 @@ def bin_count(values: Array) -> int:
 
 
 def bin_edges(least: float, largest: float, bins: int) -> Array:
-    """Return the edges of bins of the same width, as NumPy's histogram."""
+    """Return the edges of bins of the same width, like NumPy's histogram."""
     beyond = 0.5 if least == largest else 0.0
     return np.linspace(least - beyond, largest + beyond, bins + 1)
 

@@ -50,7 +50,7 @@ class CorrelationSection(Section):
 def _in_order(
     varied: Sequence[Varied], correlations: Mapping[tuple[str, str], float]
 ) -> tuple[Varied, ...]:
-    """Return the varied quantities, with correlated discrete values in rising order."""
+    """Return the varied quantities, with correlated discrete values in ascending order."""
     correlated = {name for pair in correlations for name in pair}
     return tuple(
         replace(each, distribution=rising(each.distribution))

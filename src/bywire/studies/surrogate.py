@@ -39,8 +39,8 @@ class Surrogate:
     low, high
         Minimum and maximum of each quantity in the cases [SI].
     singles
-        Discrete values of quantities in the cases [SI], in rising order; the surrogate is not valid
-        between them.
+        Discrete values of quantities in the cases [SI], in ascending order. The surrogate is not
+        valid between them.
     cases
         Number of cases with the figure.
     degree, terms

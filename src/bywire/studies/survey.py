@@ -39,7 +39,7 @@ class FigureTally:
     Parameters
     ----------
     edges
-        Values of the first block, in rising order, between which values are counted.
+        Values of the first block, in ascending order, between which values are counted.
     count, mean, squares
         Number of values, their mean, and the sum of squared differences from it.
     least, largest
@@ -156,7 +156,7 @@ class DemandTally:
     demand, error
         The requirement, and the numerical error of its figure, in its unit.
     sizes
-        Rising numbers of first cases for which to count those that meet it.
+        Increasing numbers of first cases for which to count those that meet it.
     cases, met, may, surely, near
         Number of cases, of cases that meet it, that meet it or are too close to the limit, that
         meet it and are not too close, and that are too close.
