@@ -103,6 +103,8 @@ def test_limits_of_one_study_are_judged_together(tmp_path: Path) -> None:
         ('study = "missing.toml"', FileError, "missing.toml"),
         ('record = "missing.csv"\nbench = "hard-braking"', FileError, "missing.csv"),
         ('record = "list.toml"', ParameterError, "bench"),
+        ('record = "list.toml"\nbench = "hard-braking"', ParameterError, "tolerance"),
+        ('loop = "pressure"\nat = "500 bar"', ParameterError, ""),
         (
             'manual = "seen"\nperson = "A"\ndate = 2026-01-01\nfile = "list.toml"',
             ParameterError,

@@ -166,6 +166,14 @@ def test_damaged_evidence_is_computed_again(tmp_path: Path) -> None:
     assert COMPUTED == ["R"]
 
 
+def test_a_damaged_earlier_sign_off_is_not_silent(tmp_path: Path) -> None:
+    entries = [requirement("R"), spring("R", [200e3])]
+    signed(tmp_path, *entries)
+    (tmp_path / "out" / "signoff.json").write_text("{}")
+    with pytest.warns(UserWarning, match="damaged"):
+        signed(tmp_path, *entries)
+
+
 def test_changes_since_the_last_sign_off_are_listed(tmp_path: Path) -> None:
     signed(tmp_path, requirement("R"), spring("R", [200e3]), requirement("old"))
     made = signed(tmp_path, requirement("R"), spring("R", [50e3]), requirement("new"))
@@ -173,6 +181,25 @@ def test_changes_since_the_last_sign_off_are_listed(tmp_path: Path) -> None:
     assert "R is missed; it was met" in texts
     assert "new is new" in texts
     assert "old was removed" in texts
+
+
+def test_a_loosened_limit_and_a_removed_assumption_are_changes(tmp_path: Path) -> None:
+    assumed = [requirement("A", kind="assumption"), spring("A", [300e3])]
+    before = [requirement("R", assumes=["A"]), spring("R", [200e3]), *assumed]
+    assert signed(tmp_path, *before).holds
+    after = [requirement("R"), spring("R", [200e3], "force >= 1 N"), *assumed]
+    made = signed(tmp_path, *after)
+    assert made.holds
+    texts = "\n".join(made.changes)
+    assert "force >= 1 N" in texts
+    assert "force >= 100 N" in texts
+    assert "assumptions: none. Before: A" in texts
+
+
+def test_a_value_below_its_error_is_not_shown_as_zero(tmp_path: Path) -> None:
+    made = signed(tmp_path, requirement("R"), spring("R", [4.7e3], "force <= 20 N", error=5.2))
+    assert made.holds
+    assert "4.7 N" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_hostile_texts_stay_text(tmp_path: Path) -> None:

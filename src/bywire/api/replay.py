@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -17,6 +17,7 @@ from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import without_step
 from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.requirements import Limit
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.model import Model
@@ -33,7 +34,7 @@ from bywire.identification.replay_fit import (
     whole_record,
 )
 from bywire.identification.tracking import Track
-from bywire.report.answer import Answer, Outcome, outcome_of
+from bywire.report.answer import Answer, FigureAt, Outcome, outcome_of
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -80,6 +81,25 @@ class Replay(Answer):
     def holds(self) -> bool:
         """Whether every tolerance is met."""
         return all(v.met for fit in self.fits for v in fit.verdicts)
+
+    @property
+    def key_figures(self) -> list[FigureAt]:
+        """Figures of every signal and segment, named ``SIGNAL.FIGURE``."""
+        return [
+            FigureAt(replace(kpi, name=f"{fit.signal}.{kpi.name}"), fit.segment.name)
+            for fit in self.fits
+            for kpi in fit.kpis
+        ]
+
+    @property
+    def own_limits(self) -> list[Limit]:
+        """Tolerances of every signal."""
+        limits = (
+            replace(verdict.required, figure=f"{fit.signal}.{verdict.kpi}")
+            for fit in self.fits
+            for verdict in fit.verdicts
+        )
+        return list(dict.fromkeys(limits))
 
     @property
     def outcome(self) -> Outcome:

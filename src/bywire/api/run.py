@@ -21,7 +21,7 @@ from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.faults.fault_section import from_text
-from bywire.bench.requirements import Verdict
+from bywire.bench.requirements import Limit, Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
@@ -139,6 +139,11 @@ class BenchResult(Result, Answer):
     def key_figures(self) -> list[FigureAt]:
         """The key figures of the bench."""
         return [FigureAt(kpi) for kpi in self.kpis]
+
+    @property
+    def own_limits(self) -> list[Limit]:
+        """Limits of the bench's requirements."""
+        return list(self.bench.limits.values())
 
     @property
     def outcome(self) -> Outcome:

@@ -16,7 +16,7 @@ from bywire.api.run_sections import choice_data, choice_texts, fault_texts
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, run_benches, varied_leaf
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.requirements import Verdict
+from bywire.bench.requirements import Limit, Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
 from bywire.bench.step_choice import exceeded, spread_over, with_chosen_step
@@ -79,6 +79,11 @@ class BenchRange(Answer):
             for value, result in zip(self.values, self.results, strict=True)
             for kpi in result.kpis
         ]
+
+    @property
+    def own_limits(self) -> list[Limit]:
+        """Limits of the bench's requirements."""
+        return list(self.bench.limits.values())
 
     @property
     def outcome(self) -> Outcome:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import platform
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,7 +15,6 @@ from typing import Any
 
 from bywire.cases.identity import as_json, differing
 from bywire.core.units import difference_unit
-from bywire.core.version import __version__
 from bywire.report.answer import OUTCOMES, Answer, Outcome, outcome_of
 from bywire.report.document import (
     Attachment,
@@ -27,7 +27,7 @@ from bywire.report.document import (
     Section,
     TableBlock,
 )
-from bywire.report.identity import today
+from bywire.report.identity import identity, today
 from bywire.report.tables import OUTCOMES as OUTCOME_CELLS
 from bywire.report.tables import Cell, Column, Table, text_table
 from bywire.report.wording import amount, beside_limit, clean, measured_amount
@@ -192,7 +192,8 @@ class SignOff(Answer):
             missing = tuple(Judged("not shown", text, note=why) for text in texts)
             return Shown(evidence, None, missing)
         if not evidence.limits:
-            return Shown(evidence, kept, (Judged(kept.outcome, note=kept.summary),))
+            whole = (Judged(kept.outcome, note=kept.summary),)
+            return Shown(evidence, kept, tuple(kept.judged.values()) or whole)
         judged = tuple(
             kept.judged.get(str(limit)) or judge_limit(limit, kept.figures)
             for limit in evidence.limits
@@ -413,6 +414,7 @@ class SignOff(Answer):
             *([f"{clean(imported.file)}: SHA-256 {imported.digest}"] if imported else []),
             *(f"{name} {value}" for name, value in _versions()),
             f"machine: {_machine()}",
+            f"{len(self.plan.evidence)} pieces of evidence from {len(self.plan.tasks)} results",
         ]
         table = TableBlock(text_table(("evidence", "digest", "folder"), rows))
         return [Listing(made), Details("Digests of the evidence", [table])]
@@ -448,8 +450,15 @@ class SignOff(Answer):
             "warnings": self.warnings,
             "since": self.compared_with,
             "changes": self.changes,
-            "bywire": __version__,
+            "signatures": list(self.plan.signatures),
+            "made": [{"name": name, "value": value} for name, value in self._made()],
         }
+
+    def _made(self) -> Iterator[tuple[str, str]]:
+        """Yield date, person, command, versions and machine."""
+        yield from identity()
+        yield from _versions()
+        yield "machine", _machine()
 
     def _verdicts_data(self) -> dict[str, Any]:
         return {
@@ -480,8 +489,7 @@ class SignOff(Answer):
                 (
                     each.statement.text,
                     *(
-                        f"{one.evidence.task.title}: {judged.limit} {_value(judged)} "
-                        f"{judged.outcome}"
+                        f"{one.evidence.task.title}: {_in_words(judged)}"
                         for one in each.shown
                         for judged in one.judged
                     ),
@@ -532,6 +540,13 @@ def _reason(judged: Judged) -> str:
     return told or judged.outcome
 
 
+def _in_words(judged: Judged) -> str:
+    """Return limit, value and verdict in one line."""
+    if not judged.unit:
+        return f"{judged.outcome}, {judged.note}" if judged.note else judged.outcome
+    return f"{judged.limit}: {_value(judged)}, {judged.outcome}"
+
+
 def _value(judged: Judged) -> str:
     """Return the value, in dB if the limit is in dB."""
     if not judged.unit:
@@ -539,6 +554,8 @@ def _value(judged: Judged) -> str:
     if _is_in_decibel(judged):
         return f"{_decibel(judged.value):.4g} dB"
     value, error, unit = _beside_limit(judged)
+    if value is not None and abs(value) <= error:  # measured_amount would show 0
+        return amount(value, unit, 2)
     return measured_amount(value, unit, error)
 
 
@@ -632,6 +649,9 @@ def _shown_data(one: Shown) -> dict[str, Any]:
 
 # --- Changes
 
+_COMPARED = {"text": "text", "source": "source", "group": "group", "assumes": "assumptions"}
+"""entries of a requirement that are compared, with their nouns"""
+
 
 def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
     """Yield the changes between the JSON objects of two sign-offs.
@@ -646,8 +666,12 @@ def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]
         earlier = old[id]
         if earlier.get("outcome") != each["outcome"]:
             yield f"{id} is {each['outcome']}; it was {earlier.get('outcome')}"
-        if earlier.get("text") != each["text"]:
-            yield f"{id}: the text has changed"
+        for key, noun in _COMPARED.items():
+            if earlier.get(key) != each[key]:
+                yield f"{id}: {noun}: {_listed(each[key])}. Before: {_listed(earlier.get(key))}"
+        limits = _limits(each)
+        if (known_limits := _limits(earlier)) != limits:
+            yield f"{id}: limits: {_listed(limits)}. Before: {_listed(known_limits)}"
         digests = {one.get("title"): one.get("digest") for one in _entries(earlier, "evidence")}
         for one in each["evidence"]:
             known = digests.pop(one["title"], None)
@@ -661,6 +685,21 @@ def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]
         yield f"{id} was removed"
 
 
+def _listed(value: Any) -> str:
+    """Return a text, or a list of texts, in one line."""
+    return ("; ".join(map(str, value)) if isinstance(value, list) else str(value or "")) or "none"
+
+
+def _limits(requirement: Mapping[str, Any]) -> list[str]:
+    """Return the limits of a requirement's evidence."""
+    return [
+        str(verdict.get("limit"))
+        for one in _entries(requirement, "evidence")
+        for verdict in _entries(one, "verdicts")
+        if verdict.get("limit")
+    ]
+
+
 def _by_id(data: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     rows = [*_entries(data, "requirements"), *_entries(data, "assumptions")]
     return {str(each.get("id")): each for each in rows}
@@ -672,7 +711,6 @@ def _entries(data: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
 
 
 def _versions() -> Iterator[tuple[str, str]]:
-    yield "bywire", __version__
     yield "Python", platform.python_version()
     for name in _LIBRARIES:
         try:
@@ -775,8 +813,12 @@ class Affected(Answer):
         )
 
 
+_FILE = re.compile(r"files ([^:;]+): [^;]+")
+
+
 def _why(earlier: Sequence[Kept], identity: Mapping[str, Any]) -> str:
     if not earlier:
         return "not computed yet"
     texts = [differing(kept.identity, identity) for kept in earlier]
+    texts = [_FILE.sub(r"\1 has changed", text) for text in texts]  # digests tell a reader nothing
     return min((text for text in texts if text), key=len, default="its result is damaged")

@@ -165,6 +165,8 @@ def _rejection(
     if kind is Literal and not hint:
         return unknown_name(name, str(value), get_args(info.annotation))
     valid = "" if hint else _VALID[kind]
+    if kind is str and isinstance(value, str):  # only a blank string is not valid
+        valid = "a string that is not blank"
     text = f"{name} = {quoted(value)}" + (f": {hint}" if hint else f" must be {valid}")
     return ParameterError(text, name=name, value=quoted(value), valid=valid)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.requirements import Limit
 from bywire.core.arguments import require_kinds
 from bywire.core.errors import unknown_name
 from bywire.report.document import Document, FigureBlock, TableBlock
@@ -96,6 +97,11 @@ class Answer(ABC):
     @property
     def key_figures(self) -> list[FigureAt]:
         """Key figures on which requirements can be judged. Default: none."""
+        return []
+
+    @property
+    def own_limits(self) -> list[Limit]:
+        """Limits of these key figures that the result itself judges. Default: none."""
         return []
 
     @property

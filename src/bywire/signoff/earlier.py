@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from warnings import warn
 
 from bywire.cases.store import json_object
 from bywire.core.errors import FileError
@@ -35,7 +36,10 @@ def earlier_signoff(folder: Path, since: Path | None) -> tuple[Mapping[str, Any]
         if not isinstance(content.get("requirements"), list):
             raise ValueError("no requirements")
     except (OSError, ValueError) as error:
+        if since is None and isinstance(error, FileNotFoundError):
+            return {}, ""
         if since is None:
+            warn(f"{path} is damaged, so the document lists no changes", stacklevel=2)
             return {}, ""
         reason = error.strerror if isinstance(error, OSError) else "it is not a sign-off"
         raise FileError(

@@ -109,6 +109,7 @@ class EvidenceStore:
             "judged": {text: each.as_object() for text, each in computed.judged.items()},
             "warnings": [*answer.failures, *answer.warnings],
             "page": _PAGE if (place / _PAGE).is_file() else "",
+            "files": _sizes(place),
         }
         record = {"checksum": _checksum(said), **said}
         try:
@@ -132,6 +133,12 @@ def _checksum(said: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
 
+def _sizes(place: Path) -> dict[str, int]:
+    """Return the size of every file of a result, so that a damaged one is noticed."""
+    files = sorted(path for path in place.glob("*") if path.is_file() and path.name != RECORD)
+    return {path.name: path.stat().st_size for path in files}
+
+
 def _read(place: Path) -> Kept | None:
     """Return the evidence in a folder; None if it is missing, incomplete or damaged."""
     try:
@@ -140,6 +147,9 @@ def _read(place: Path) -> Kept | None:
             return None
         page = str(said["page"])
         if page not in ("", _PAGE) or (page and not (place / page).is_file()):
+            return None
+        present = _sizes(place)
+        if any(present.get(name) != size for name, size in said["files"].items()):
             return None
         if said["outcome"] not in OUTCOMES:
             return None

@@ -138,7 +138,7 @@ class ErrorCheck:
     def warning(self) -> str:
         """Warning if cases exceed the stated error; otherwise empty."""
         texts = [
-            f"{name} in {count} cases (up to {percent_text(self.largest[name])})"
+            f"{name} in {count} case{'s' * (count != 1)} (up to {100.0 * self.largest[name]:.3g} %)"
             for name, count in self.exceeding.items()
         ]
         if not texts:

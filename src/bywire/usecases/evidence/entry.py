@@ -154,12 +154,8 @@ def file_digest(path: Path) -> str:
 
 
 def digests_of(asked: Mapping[str, Any]) -> dict[str, str]:
-    """Return the digest of every file among the values of arguments, by the argument's name."""
-    return {
-        f"{name} {k}": file_digest(path)
-        for name, value in asked.items()
-        for k, path in enumerate(_files(value))
-    }
+    """Return the digest of every file among the values of arguments, by the file's name."""
+    return {path.name: file_digest(path) for value in asked.values() for path in _files(value)}
 
 
 def _files(value: Any) -> Iterator[Path]:

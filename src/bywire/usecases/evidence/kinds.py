@@ -27,6 +27,7 @@ from bywire.identification.replay_fit import read_tolerances
 from bywire.life.life_file import LifePlan
 from bywire.procedures.procedure_file import ProcedurePlan
 from bywire.report.bench_figures import FIGURES
+from bywire.signoff.judging import judge_limit
 from bywire.signoff.plan import Computed, Task
 from bywire.synthesis.linear_case import read as read_loop_limits
 from bywire.usecases import use_cases
@@ -131,6 +132,7 @@ def _bench_limit(bench: Bench, text: str) -> Limit:
 
 def _read_loop(asked: Asked) -> LoopCase:
     case: LoopCase = use_cases()["margins"].read(asked)[0]
+    case.loop.point(case.par, case.value)  # rejects an impossible operating point
     return case
 
 
@@ -212,8 +214,13 @@ def _read_record(asked: Asked) -> Bench:
             "experiment",
             name="bench",
         )
-    read_tolerances(asked.get("tolerance", ()))
     require_file(asked["measurement"])
+    if not asked.get("tolerance"):
+        raise ParameterError(
+            '[[evidence]] record needs a tolerance, such as tolerance = "p_mc.nrmse <= 5 %"',
+            name="tolerance",
+        )
+    read_tolerances(asked["tolerance"])
     return driven_bench(asked["bench"], asked.get("set", {}))
 
 
@@ -352,7 +359,9 @@ class UseCaseTask(Task):
         answer = kind.case.call(asked, progress=progress, out=folder)
         if kind.has_report:
             answer.write(folder)
-        return Computed(answer)
+        figures = answer.key_figures
+        judged = [judge_limit(limit, figures) for limit in answer.own_limits]
+        return Computed(answer, {each.limit: each for each in judged})
 
 
 def read_kind(kind: str, subject: str, arguments: Mapping[str, Any], folder: Path) -> UseCaseTask:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from bywire.api.signoff import ManualEntry
 from bywire.bench.requirements import Limit
 from bywire.core.errors import FileError, ParameterError, not_valid, quoted, unknown_of_few
-from bywire.core.section import Name, Section
+from bywire.core.section import Hint, Name, Section
 from bywire.core.typing import Progress
 from bywire.signoff.plan import Computed, Task
 from bywire.usecases.evidence.entry import Origin, file_digest, require_file
 
 KEYS = ("person", "date", "file", "sha256", "verdict")
+
+
+_DIGEST = re.compile("[0-9a-f]{64}")
 
 
 class ManualSection(Section):
@@ -26,7 +30,7 @@ class ManualSection(Section):
     date: Any
     file: Name
     sha256: Name
-    verdict: Literal["met", "missed"]
+    verdict: Annotated[Literal["met", "missed"], Hint('write "met" or "missed"')]
 
 
 @dataclass(frozen=True)
@@ -99,6 +103,11 @@ def read_manual(what: str, arguments: Mapping[str, Any], folder: Path) -> Manual
         if name not in KEYS:
             raise unknown_of_few("key of [[evidence]] manual", name, (*KEYS, "shows", "note"))
     path = arguments.get("file")
+    if path is None:
+        raise ParameterError(
+            '[[evidence]] manual needs the file that documents the statement. Add file = "PATH"',
+            name="file",
+        )
     if isinstance(path, str) and "sha256" not in arguments:
         require_file(folder / path)
         raise ParameterError(
@@ -109,6 +118,10 @@ def read_manual(what: str, arguments: Mapping[str, Any], folder: Path) -> Manual
     section = ManualSection.read(arguments, "[[evidence]] manual")
     file = folder / section.file
     require_file(file)
+    if not _DIGEST.fullmatch(section.sha256.lower()):
+        raise not_valid(
+            "[[evidence]] sha256", quoted(section.sha256), "a digest of 64 hexadecimal digits"
+        )
     found = file_digest(file)
     if found != section.sha256.lower():
         raise FileError(
@@ -130,4 +143,6 @@ def _date(value: Any) -> str:
         raise not_valid(
             "[[evidence]] date", quoted(value), "a date such as 2026-11-27", kind=ParameterError
         ) from None
+    if day > date.today():
+        raise not_valid("[[evidence]] date", day.isoformat(), "a date that is not in the future")
     return day.isoformat()
