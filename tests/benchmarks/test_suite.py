@@ -94,8 +94,9 @@ def test_a_peer_that_fails_leaves_the_others(monkeypatch):
     monkeypatch.setattr(others, "PEERS", [others.Peer("cvodes", 30.0), others.Peer("lsoda", 200.0)])
     monkeypatch.setattr(others, "_plain", lambda run: (1.0,))
     monkeypatch.setattr(cvodes, "solve", solve)
-    first, second = others.others(parameters("dardanelli2010"))
+    first, second, *unmeasured = others.others(parameters("dardanelli2010"))
     assert (first.id, first.is_failed) == ("peer.cvodes", True)
     assert "ValueError: another version of it" in first.note
     assert (second.id, second.is_failed) == ("peer.lsoda", False)
     assert second.value is not None
+    assert all(each.note for each in unmeasured)

@@ -18,6 +18,7 @@ from site_pages import results  # noqa: E402  beside what they describe
 WITHOUT_RESULT = {
     "measurement-files": "files of the reader",
     "serve": "a server",
+    "signoff": "a document with links to the figures of its evidence",
     "speed": "benchmarks of an hour",
     "wasm": "files for a browser; the live benches are a page of the site",
 }

@@ -31,6 +31,7 @@ COMMANDS: dict[str, list[str]] = {
     "margins": ["pressure"],
     "life": ["life.toml"],
     "procedure": ["procedure.toml"],
+    "signoff": ["signoff.toml"],
     "faults": ["campaign.toml"],
     "design": ["current"],
     "convert": ["measured.csv", "made.csv", "--force"],
@@ -132,6 +133,7 @@ def prepared(folder: Path) -> Path:
     (folder / "campaign.toml").write_text(head + only + _CRITERION)
     (folder / "life.toml").write_text('life = "none"\n')
     (folder / "procedure.toml").write_text('procedure = "none"\n')
+    (folder / "signoff.toml").write_text('[[requirement]]\nid = "R"\ntext = "It brakes."\n')
     return folder
 
 

@@ -12,10 +12,16 @@ from bywire.reproduction.reproduction import Part, Reproduction, reproduced
 EMPTY = Reproduction("made-up", "Nobody, 2010")
 
 
+def asked_bench(*asked: object) -> SimpleNamespace:
+    """Return a bench that is nothing but its arguments."""
+    values = SimpleNamespace(flat=lambda: asked)
+    return SimpleNamespace(par=values, chosen_options=values, chosen_stimuli=asked)
+
+
 @pytest.fixture(autouse=True)
 def two_cores_and_any_bench(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.cpu_count", lambda: 2)
-    monkeypatch.setattr(shared, "Bench", lambda *asked: asked)
+    monkeypatch.setattr(shared, "Bench", asked_bench)
     monkeypatch.setattr(shared, "run", lambda bench: SimpleNamespace(status="finished"))
 
 

@@ -167,7 +167,7 @@ def test_memory_that_others_took_meanwhile_is_said(runs, driver, monkeypatch):
     ("function", "status", "said"),
     [
         ("cuCtxSynchronize", Status.CUDA_ERROR_ILLEGAL_ADDRESS, "failed: .* why .*_ILLEGAL_ADDR"),
-        ("cuCtxSynchronize", Status.CUDA_ERROR_LAUNCH_TIMEOUT, "too long .* with a display"),
+        ("cuCtxSynchronize", Status.CUDA_ERROR_LAUNCH_TIMEOUT, "too long .* drives a display"),
         ("cuLaunchKernel", Status.CUDA_ERROR_LAUNCH_FAILED, "failed: .* why .*_LAUNCH_FAILED"),
         ("cuMemcpyHtoD", Status.CUDA_ERROR_UNKNOWN, r"failed: .* why \(CUDA_ERROR_UNKNOWN\)"),
         ("cuMemcpyDtoH", Status.CUDA_ERROR_ECC_UNCORRECTABLE, "uncorrectable memory error"),
