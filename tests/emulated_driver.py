@@ -225,7 +225,7 @@ class EmulatedDriver:
         return (OK,)
 
     def cuGetErrorString(self, status: Status) -> Any:
-        return OK, b"it is said why"
+        return OK, b"the driver states why"
 
 
 @contextmanager
@@ -234,7 +234,7 @@ def emulated(driver: EmulatedDriver) -> Iterator[EmulatedDriver]:
     kept = Prepared.engine
 
     def engine(prepared: Prepared, kind: str = "auto") -> Engine:
-        """Return an engine, which on a graphics processor is none of an earlier driver."""
+        """Return an engine; on a graphics processor, a new one for this driver."""
         return prepared._build(kind) if kind == "cuda" else kept(prepared, kind)
 
     with pytest.MonkeyPatch.context() as patch:

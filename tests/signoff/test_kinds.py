@@ -12,6 +12,7 @@ from bywire.signoff.plan import SignOffPlan
 from bywire.signoff.signoff_file import read_signoff
 from bywire.usecases.evidence.readers import READERS
 from raising import raises
+from signoff.closed_form import READERS as SPRINGS
 
 REQUIREMENT = '[[requirement]]\nid = "R"\ntext = "T."\n'
 
@@ -132,3 +133,20 @@ def test_a_manual_entry_holds_until_its_file_changes(tmp_path: Path) -> None:
     report.write_bytes(b"cracks")
     with raises(FileError, name="report.pdf", valid=digest):
         plan_of(tmp_path, entry)
+
+
+def test_files_with_one_name_and_entries_with_one_title_stay_apart(tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "rig.csv").write_text("1\n")
+    evidence = 'identification = "friction-ramp"\nmeasurements = ["a/rig.csv", "b/rig.csv"]'
+    before = digest_of(tmp_path, evidence)
+    for folder in ("a", "b"):
+        (tmp_path / folder / "rig.csv").write_text("2\n")
+        assert digest_of(tmp_path, evidence) != before
+        (tmp_path / folder / "rig.csv").write_text("1\n")
+    one = 'spring = "s"\nk = [1.0]\nnumber = 1\n'
+    other = one.replace("number = 1", "number = 2")  # the title does not contain the arguments
+    file = tmp_path / "springs.toml"
+    file.write_text(REQUIREMENT + "".join(f'[[evidence]]\nshows = "R"\n{e}' for e in (one, other)))
+    assert len(read_signoff(file, SPRINGS).tasks) == 2

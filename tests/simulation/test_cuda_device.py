@@ -77,8 +77,16 @@ def failing(status: Status) -> Callable[..., Any]:
             Status.CUDA_ERROR_ECC_UNCORRECTABLE,
             "emulated 0 has an uncorrectable memory error.*rerun the call.*--gpu-reset",
         ),
-        ("cuDevicePrimaryCtxSetFlags", Status.CUDA_ERROR_UNKNOWN, "emulated 0 failed: it is said"),
-        ("cuDeviceGet", Status.CUDA_ERROR_UNKNOWN, "graphics processor 0 failed: it is said why"),
+        (
+            "cuDevicePrimaryCtxSetFlags",
+            Status.CUDA_ERROR_UNKNOWN,
+            "emulated 0 failed: the driver states",
+        ),
+        (
+            "cuDeviceGet",
+            Status.CUDA_ERROR_UNKNOWN,
+            "graphics processor 0 failed: the driver states why",
+        ),
         (
             "cuInit",
             Status.CUDA_ERROR_SYSTEM_DRIVER_MISMATCH,

@@ -84,7 +84,7 @@ def bench_identity(bench: Bench, choices: Iterable[Mapping[str, Any]] = ()) -> d
 
 
 def files_identity(bench: Bench) -> dict[str, Any]:
-    """Digest of every file that the options name; empty if there is none."""
+    """Digest of every file that the options name. Empty without such files."""
     files = {
         name: hashlib.sha256(Path(str(value)).read_bytes()).hexdigest()
         for name, value in bench.chosen_options.flat().items()

@@ -15,7 +15,7 @@ RECORD = "signoff.json"
 
 
 def earlier_signoff(folder: Path, since: Path | None) -> tuple[Mapping[str, Any], str]:
-    """Return the JSON object of an earlier sign-off, and its name; empty if there is none.
+    """Return the JSON object of an earlier sign-off, and its name. Both are empty without one.
 
     Parameters
     ----------

@@ -191,15 +191,16 @@ def _together(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
     limits: dict[str, dict[str, Limit]] = {}
     tasks: dict[str, Task] = {}
     for each in evidence:
-        tasks.setdefault(each.task.title, each.task)
-        joined = limits.setdefault(each.task.title, {})
+        entry = repr(each.task.origin)  # different entries may have the same title
+        tasks.setdefault(entry, each.task)
+        joined = limits.setdefault(entry, {})
         joined.update({str(limit): limit for limit in each.limits})
     made: list[Evidence] = []
     first: dict[str, Evidence] = {}
     for each in evidence:
         with placed(each.place):
-            title = each.task.title
-            task = tasks[title].with_limits(tuple(limits[title].values()))
+            entry = repr(each.task.origin)
+            task = tasks[entry].with_limits(tuple(limits[entry].values()))
             other = first.setdefault(task.shelf, replace(each, task=task))
             if other.task.digest != task.digest:
                 raise ParameterError(

@@ -39,7 +39,7 @@ class Completed:
 
 
 def _allowed_workers(workers: int | None, chunks: int) -> int | None:
-    """Return the number of processes on the graphics processor, or fail if there is none.
+    """Return the number of processes on the graphics processor, or fail without a processor.
 
     A copy of this process looks for it if workers will be copies too, because copies of a process
     that has used the driver cannot use it.
@@ -104,7 +104,7 @@ def complete(
     RunError
         If the bench itself fails, or all workers are lost.
     DeviceError
-        If the bench needs a graphics processor, and there is none, or it fails. Finished chunks
+        If the bench needs a graphics processor that is missing or fails. Finished chunks
         remain.
     KeyboardInterrupt
         If interrupted. Finished chunks remain.

@@ -44,8 +44,8 @@ class CaseAxis:
     name, unit
         Label, and SI unit, or ``"%"``.
     values
-        Value of each drawn case, shape (cases,), NaN where there is none; for choices the index of
-        each case's choice.
+        Value of each drawn case, shape (cases,), NaN if a case has no value. For choices, the index
+        of each case's choice.
     choices
         Names of the choices, in order; empty for numbers.
     ends

@@ -153,9 +153,13 @@ def file_digest(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def digests_of(asked: Mapping[str, Any]) -> dict[str, str]:
-    """Return the digest of every file among the values of arguments, by the file's name."""
-    return {path.name: file_digest(path) for value in asked.values() for path in _files(value)}
+def digests_of(asked: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Return the digests of all files among the values of arguments, by the files' names."""
+    digests: dict[str, list[str]] = {}
+    for value in asked.values():
+        for path in _files(value):
+            digests.setdefault(path.name, []).append(file_digest(path))
+    return digests
 
 
 def _files(value: Any) -> Iterator[Path]:
